@@ -1,0 +1,6 @@
+//! luxel: light transport with a known error.
+#![deny(unsafe_code)]
+
+pub mod bsdf;
+pub mod geom;
+pub mod math;
