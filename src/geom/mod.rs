@@ -15,7 +15,11 @@ pub struct Ray {
 
 impl Ray {
     pub fn new(o: Vec3, d: Vec3) -> Ray {
-        Ray { o, d, t_max: f32::INFINITY }
+        Ray {
+            o,
+            d,
+            t_max: f32::INFINITY,
+        }
     }
 
     pub fn at(&self, t: f32) -> Vec3 {
@@ -72,7 +76,11 @@ impl Hit {
         let to = q.offset_towards(o);
         let d = to - o;
         let len = d.length();
-        Ray { o, d: d / len, t_max: fp::connection_t_max(len) }
+        Ray {
+            o,
+            d: d / len,
+            t_max: fp::connection_t_max(len),
+        }
     }
 }
 

@@ -31,7 +31,11 @@ pub fn offset_origin(p: Vec3, p_err: Vec3, ng: Vec3, w: Vec3) -> Vec3 {
             moved
         }
     };
-    Vec3::new(away(p.x, offset.x), away(p.y, offset.y), away(p.z, offset.z))
+    Vec3::new(
+        away(p.x, offset.x),
+        away(p.y, offset.y),
+        away(p.z, offset.z),
+    )
 }
 
 /// How far along a connection of length `len` between two offset points a blocker may lie. The end

@@ -225,7 +225,11 @@ impl Frame {
         // The projection is all rounding once it is this much shorter than what was projected.
         if len2 > 1e-10 * dp_du.length_squared() && len2.is_normal() {
             let s = s / len2.sqrt();
-            Frame { s, t: n.cross(s), n }
+            Frame {
+                s,
+                t: n.cross(s),
+                n,
+            }
         } else {
             Frame::from_normal(n)
         }
@@ -250,7 +254,10 @@ pub struct Aabb {
 }
 
 impl Aabb {
-    pub const EMPTY: Aabb = Aabb { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
+    pub const EMPTY: Aabb = Aabb {
+        min: Vec3::INFINITY,
+        max: Vec3::NEG_INFINITY,
+    };
 
     #[inline]
     pub fn grow(&mut self, p: Vec3) {
@@ -260,7 +267,10 @@ impl Aabb {
 
     #[inline]
     pub fn union(self, o: Aabb) -> Aabb {
-        Aabb { min: self.min.min(o.min), max: self.max.max(o.max) }
+        Aabb {
+            min: self.min.min(o.min),
+            max: self.max.max(o.max),
+        }
     }
 
     pub fn is_empty(&self) -> bool {
@@ -294,7 +304,13 @@ mod tests {
     #[test]
     fn frames_are_orthonormal_and_right_handed() {
         let third = 1.0 / 3f32.sqrt();
-        for n in [Vec3::Z, -Vec3::Z, Vec3::X, Vec3::splat(third), Vec3::new(third, -third, -third)] {
+        for n in [
+            Vec3::Z,
+            -Vec3::Z,
+            Vec3::X,
+            Vec3::splat(third),
+            Vec3::new(third, -third, -third),
+        ] {
             for f in [
                 Frame::from_normal(n),
                 Frame::from_tangent(n, Vec3::new(0.3, 2.0, -0.1)),

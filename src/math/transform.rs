@@ -17,12 +17,21 @@ impl Default for Transform {
 }
 
 impl Transform {
-    pub const IDENTITY: Transform = Transform { m: DAffine3::IDENTITY, inv: DAffine3::IDENTITY };
+    pub const IDENTITY: Transform = Transform {
+        m: DAffine3::IDENTITY,
+        inv: DAffine3::IDENTITY,
+    };
 
     /// `None` when the map is singular, not finite, or so close to singular that its inverse is noise.
     pub fn new(m: DAffine3) -> Option<Transform> {
         let inv = m.inverse();
-        let norm = |a: DMat3| a.x_axis.abs().max(a.y_axis.abs()).max(a.z_axis.abs()).max_element();
+        let norm = |a: DMat3| {
+            a.x_axis
+                .abs()
+                .max(a.y_axis.abs())
+                .max(a.z_axis.abs())
+                .max_element()
+        };
         let condition = norm(m.matrix3) * norm(inv.matrix3);
         // Beyond this the inverse has no correct digit left in f64.
         (m.is_finite() && inv.is_finite() && condition < 1e15).then_some(Transform { m, inv })
@@ -31,11 +40,16 @@ impl Transform {
     /// From a row-major 4x4 matrix. `None` when it is not affine or not invertible.
     pub fn from_rows(rows: [[f64; 4]; 4]) -> Option<Transform> {
         let m = DMat4::from_cols_array_2d(&rows).transpose();
-        (m.row(3) == DVec4::W).then(|| DAffine3::from_mat4(m)).and_then(Transform::new)
+        (m.row(3) == DVec4::W)
+            .then(|| DAffine3::from_mat4(m))
+            .and_then(Transform::new)
     }
 
     pub fn translate(v: DVec3) -> Transform {
-        Transform { m: DAffine3::from_translation(v), inv: DAffine3::from_translation(-v) }
+        Transform {
+            m: DAffine3::from_translation(v),
+            inv: DAffine3::from_translation(-v),
+        }
     }
 
     /// `None` when a factor is zero.
@@ -55,7 +69,10 @@ impl Transform {
         let dir = (target - origin).try_normalize()?;
         let left = up.cross(dir).try_normalize()?;
         let new_up = dir.cross(left);
-        Transform::new(DAffine3::from_mat3_translation(DMat3::from_cols(left, new_up, dir), origin))
+        Transform::new(DAffine3::from_mat3_translation(
+            DMat3::from_cols(left, new_up, dir),
+            origin,
+        ))
     }
 
     pub fn matrix(&self) -> DAffine3 {
@@ -63,7 +80,10 @@ impl Transform {
     }
 
     pub fn inverse(&self) -> Transform {
-        Transform { m: self.inv, inv: self.m }
+        Transform {
+            m: self.inv,
+            inv: self.m,
+        }
     }
 
     pub fn point(&self, p: DVec3) -> DVec3 {
@@ -89,7 +109,10 @@ impl std::ops::Mul for Transform {
     type Output = Transform;
     /// `(a * b)(p) = a(b(p))`.
     fn mul(self, b: Transform) -> Transform {
-        Transform { m: self.m * b.m, inv: b.inv * self.inv }
+        Transform {
+            m: self.m * b.m,
+            inv: b.inv * self.inv,
+        }
     }
 }
 
