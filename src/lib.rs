@@ -2,5 +2,7 @@
 #![deny(unsafe_code)]
 
 pub mod bsdf;
+pub mod film;
 pub mod geom;
 pub mod math;
+pub mod sampler;

@@ -1,0 +1,206 @@
+//! The film: per pixel and replicate the sum of its samples, in f64, and what follows from the spread of
+//! the replicates: standard errors and the estimated error of the whole image.
+
+mod estimate;
+mod filter;
+
+pub use estimate::{ErrorEstimate, student_t_95};
+pub use filter::{Filter, FilterSampler};
+
+use crate::math::Rgb;
+
+/// Side of a square tile, in pixels.
+pub const TILE: u32 = 16;
+
+/// The part of the full picture that is rendered, in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    pub x: u32,
+    pub y: u32,
+    pub width: u32,
+    pub height: u32,
+}
+
+/// Size and reconstruction of a picture.
+#[derive(Clone, Debug)]
+pub struct FilmSpec {
+    /// Full size, which the camera's field of view refers to.
+    pub width: u32,
+    pub height: u32,
+    pub crop: Window,
+    pub filter: Filter,
+}
+
+/// Bounds of the number of replicates. 16 means give a pixel's standard error to within 18 %, 4 to
+/// within 41 %; the error of the whole picture, over many pixels, is good with either.
+const MIN_REPLICATES: u32 = 4;
+const MAX_REPLICATES: u32 = 16;
+/// Samples a replicate should have: splitting a few quasi-random points up further would cost more of
+/// their accuracy than the better knowledge of it is worth.
+const SAMPLES_PER_REPLICATE: u64 = 32;
+/// Sums that may stand in memory before the number of replicates is lowered: 64 Mi sums are 1.5 GiB.
+const MAX_SUMS: u64 = 64 << 20;
+
+/// How many replicates the samples of a pixel are dealt out to: 16 from 512 samples on. `spp` is `None`
+/// when it is not known yet.
+pub fn replicates(spp: Option<u64>, pixels: u64) -> u32 {
+    let bounded = |n: u64| n.clamp(u64::from(MIN_REPLICATES), u64::from(MAX_REPLICATES)) as u32;
+    let affordable = bounded(MAX_SUMS / pixels.max(1));
+    let Some(spp) = spp else {
+        return affordable;
+    };
+    // Powers of two keep the replicates' sizes powers of two, where Sobol points are at their best.
+    let wanted = bounded((spp / SAMPLES_PER_REPLICATE).next_power_of_two());
+    wanted
+        .min(affordable)
+        .min(spp.clamp(1, u64::from(MAX_REPLICATES)) as u32)
+}
+
+/// Sums over the samples of one pixel.
+struct PixelSums<'a> {
+    rgb: &'a mut [[f64; 3]],
+    aov: &'a mut [f64],
+}
+
+/// One square of the film; tiles are filled in parallel, each by one thread at a time.
+#[derive(Clone, Debug)]
+pub struct Tile {
+    /// Position of the first pixel, relative to the crop window.
+    pub x: u32,
+    pub y: u32,
+    pub width: u32,
+    pub height: u32,
+    replicates: u32,
+    aov_channels: usize,
+    rgb: Vec<[f64; 3]>,
+    aov: Vec<f64>,
+}
+
+impl Tile {
+    fn pixel(&mut self, x: u32, y: u32) -> PixelSums<'_> {
+        let i = (y * self.width + x) as usize;
+        let (r, a) = (self.replicates as usize, self.aov_channels);
+        PixelSums {
+            rgb: &mut self.rgb[i * r..(i + 1) * r],
+            aov: &mut self.aov[i * a..(i + 1) * a],
+        }
+    }
+
+    /// Adds sample number `sample` of the pixel at (`x`, `y`) within the tile. `value` must be finite.
+    #[inline]
+    pub fn add(&mut self, x: u32, y: u32, sample: u64, value: Rgb) {
+        let replicate = (sample % u64::from(self.replicates)) as usize;
+        let sum = &mut self.pixel(x, y).rgb[replicate];
+        for (s, v) in sum.iter_mut().zip(value.to_array()) {
+            *s += f64::from(v);
+        }
+    }
+
+    /// Adds to the pixel's arbitrary output variables, one number per channel.
+    #[inline]
+    pub fn add_aov(&mut self, x: u32, y: u32, values: &[f32]) {
+        for (s, v) in self.pixel(x, y).aov.iter_mut().zip(values) {
+            *s += f64::from(*v);
+        }
+    }
+}
+
+/// All that changes while rendering.
+#[derive(Clone, Debug)]
+pub struct Film {
+    window: Window,
+    replicates: u32,
+    aov_channels: usize,
+    /// Samples that every pixel has received.
+    spp: u64,
+    tiles: Vec<Tile>,
+}
+
+impl Film {
+    pub fn new(window: Window, replicates: u32, aov_channels: usize) -> Film {
+        let starts =
+            |n: u32| (0..n.div_ceil(TILE)).map(move |i| (i * TILE, TILE.min(n - i * TILE)));
+        let tiles = starts(window.height)
+            .flat_map(|(y, height)| {
+                starts(window.width).map(move |(x, width)| {
+                    let pixels = (width * height) as usize;
+                    Tile {
+                        x,
+                        y,
+                        width,
+                        height,
+                        replicates,
+                        aov_channels,
+                        rgb: vec![[0.0; 3]; pixels * replicates as usize],
+                        aov: vec![0.0; pixels * aov_channels],
+                    }
+                })
+            })
+            .collect();
+        Film {
+            window,
+            replicates,
+            aov_channels,
+            spp: 0,
+            tiles,
+        }
+    }
+
+    pub fn window(&self) -> Window {
+        self.window
+    }
+
+    pub fn replicates(&self) -> u32 {
+        self.replicates
+    }
+
+    pub fn spp(&self) -> u64 {
+        self.spp
+    }
+
+    /// The tiles, to be given samples `spp()..spp() + n` each; then call [`Film::finish_pass`].
+    pub fn tiles_mut(&mut self) -> &mut [Tile] {
+        &mut self.tiles
+    }
+
+    /// Says that every pixel has received `n` more samples.
+    pub fn finish_pass(&mut self, n: u64) {
+        self.spp += n;
+    }
+
+    /// The mean of every pixel, row by row.
+    pub fn mean(&self) -> Vec<[f64; 3]> {
+        let n = self.spp.max(1) as f64;
+        self.gather(|tile, i| {
+            let r = self.replicates as usize;
+            let mut sum = [0.0; 3];
+            for replicate in &tile.rgb[i * r..(i + 1) * r] {
+                for c in 0..3 {
+                    sum[c] += replicate[c];
+                }
+            }
+            sum.map(|s| s / n)
+        })
+    }
+
+    /// The mean of AOV channel `channel` of every pixel, row by row.
+    pub fn aov(&self, channel: usize) -> Vec<f64> {
+        let n = self.spp.max(1) as f64;
+        self.gather(|tile, i| tile.aov[i * self.aov_channels + channel] / n)
+    }
+
+    /// One value per pixel in row order; `f` gets the tile and the pixel's index within it.
+    fn gather<T: Clone + Default>(&self, f: impl Fn(&Tile, usize) -> T) -> Vec<T> {
+        let width = self.window.width as usize;
+        let mut out = vec![T::default(); width * self.window.height as usize];
+        for tile in &self.tiles {
+            for y in 0..tile.height {
+                for x in 0..tile.width {
+                    let to = (tile.y + y) as usize * width + (tile.x + x) as usize;
+                    out[to] = f(tile, (y * tile.width + x) as usize);
+                }
+            }
+        }
+        out
+    }
+}

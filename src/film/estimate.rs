@@ -1,0 +1,261 @@
+//! What the spread of the replicates says about the error of the picture.
+
+use super::Film;
+
+/// The estimated error of an image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ErrorEstimate {
+    /// Mean over pixels and channels of variance / (mean² + 0.01).
+    pub relmse: f64,
+    /// Interval that holds the image's actual relMSE with 95 % confidence.
+    pub ci95: [f64; 2],
+}
+
+/// Regularisation of relMSE: what keeps black pixels from counting infinitely.
+pub const RELMSE_FLOOR: f64 = 0.01;
+
+/// Two-sided 95 % quantile of Student's t with `dof` degrees of freedom: half-width of a pixel's
+/// confidence interval in standard errors. Cornish-Fisher expansion (Abramowitz & Stegun 26.7.5), right
+/// to 0.3 % from 3 degrees of freedom on, where it is used.
+pub fn student_t_95(dof: u32) -> f64 {
+    const EXACT: [f64; 3] = [12.706, 4.303, 3.182];
+    if (1..=3).contains(&dof) {
+        return EXACT[dof as usize - 1];
+    }
+    let (x, n) = (1.959_963_984_540_054_f64, f64::from(dof.max(1)));
+    let g1 = (x.powi(3) + x) / 4.0;
+    let g2 = (5.0 * x.powi(5) + 16.0 * x.powi(3) + 3.0 * x) / 96.0;
+    let g3 = (3.0 * x.powi(7) + 19.0 * x.powi(5) + 17.0 * x.powi(3) - 15.0 * x) / 384.0;
+    x + g1 / n + g2 / n.powi(2) + g3 / n.powi(3)
+}
+
+/// Spread of one channel of one pixel.
+struct Spread {
+    mean: f64,
+    /// Variance of the mean.
+    variance: f64,
+    /// Estimated variance of `variance` itself.
+    variance_of_variance: f64,
+    /// Estimated covariance of `variance` and `mean`: positive for a skewed estimator.
+    covariance: f64,
+}
+
+impl Spread {
+    /// This channel's share of relMSE, variance / (truth² + floor), with the truth unknown: dividing by
+    /// the noisy mean is biased, and the second-order terms of its Taylor expansion take that bias off.
+    /// Never negative.
+    fn relative(&self) -> f64 {
+        let d = self.mean * self.mean + RELMSE_FLOOR;
+        let slope = -2.0 * self.mean / (d * d);
+        let curvature = (6.0 * self.mean * self.mean - 2.0 * RELMSE_FLOOR) / d.powi(3);
+        let bias = slope * self.covariance + 0.5 * curvature * self.variance.powi(2);
+        // Where the correction is as large as what it corrects, the expansion says nothing any more.
+        let plain = self.variance / d;
+        (plain - bias).clamp(0.5 * plain, 2.0 * plain)
+    }
+}
+
+impl Film {
+    /// Number of samples in replicate `r`.
+    fn samples_of(&self, r: usize) -> u64 {
+        let (n, all) = (self.spp, u64::from(self.replicates));
+        n / all + u64::from((r as u64) < n % all)
+    }
+
+    /// True when the replicates are enough to tell an error.
+    pub fn has_error(&self) -> bool {
+        self.replicates >= 2 && self.spp >= u64::from(self.replicates)
+    }
+
+    /// The standard error of every pixel, row by row: the square root of the variance of its mean.
+    /// Zero when [`Film::has_error`] is false.
+    pub fn standard_error(&self) -> Vec<[f64; 3]> {
+        let r = self.replicates as usize;
+        self.gather(|tile, i| {
+            let sums = &tile.rgb[i * r..(i + 1) * r];
+            std::array::from_fn(|c| self.spread(sums, c).variance.sqrt())
+        })
+    }
+
+    /// The estimated relMSE of the picture. `None` when there is no telling yet.
+    pub fn estimate_error(&self) -> Option<ErrorEstimate> {
+        if !self.has_error() {
+            return None;
+        }
+        let r = self.replicates as usize;
+        let (mut relmse, mut variance, mut count) = (0.0, 0.0, 0.0);
+        for tile in &self.tiles {
+            for sums in tile.rgb.chunks_exact(r) {
+                for c in 0..3 {
+                    let s = self.spread(sums, c);
+                    relmse += s.relative();
+                    // The estimate errs by the uncertainty of the variance; the actual squared error of
+                    // this one picture scatters about its expectation by twice the variance squared.
+                    let weight = 1.0 / (s.mean * s.mean + RELMSE_FLOOR);
+                    variance +=
+                        (s.variance_of_variance + 2.0 * s.variance.powi(2)) * weight.powi(2);
+                    count += 1.0;
+                }
+            }
+        }
+        let (relmse, half) = (relmse / count, 1.96 * variance.sqrt() / count);
+        Some(ErrorEstimate {
+            relmse,
+            ci95: [(relmse - half).max(0.0), relmse + half],
+        })
+    }
+
+    /// `sums` are the replicates of one pixel. A replicate of n_r of the n samples has the variance
+    /// σ²/n_r, so Σ n_r (m_r - m)² / (R - 1) estimates σ², and σ²/n is the variance of the mean.
+    fn spread(&self, sums: &[[f64; 3]], c: usize) -> Spread {
+        if !self.has_error() {
+            let sum: f64 = sums.iter().map(|s| s[c]).sum();
+            let mean = sum / self.spp.max(1) as f64;
+            return Spread {
+                mean,
+                variance: 0.0,
+                variance_of_variance: 0.0,
+                covariance: 0.0,
+            };
+        }
+        let (n, r) = (self.spp as f64, sums.len() as f64);
+        let mean = sums.iter().map(|s| s[c]).sum::<f64>() / n;
+        let (mut second, mut third, mut fourth) = (0.0, 0.0, 0.0);
+        for (i, s) in sums.iter().enumerate() {
+            let n_r = self.samples_of(i) as f64;
+            let d = n_r.sqrt() * (s[c] / n_r - mean);
+            second += d * d;
+            third += d * d * d;
+            fourth += (d * d).powi(2);
+        }
+        let sigma2 = second / (r - 1.0);
+        // Variance of a sample variance: (m4 - σ⁴ (r - 3)/(r - 1)) / r, never below the normal case's
+        // lower bound of zero.
+        let of_sigma2 = ((fourth / r - sigma2 * sigma2 * (r - 3.0) / (r - 1.0)) / r).max(0.0);
+        // Third central moment of the mean over n, from that of the replicates scaled by sqrt(n/r).
+        let third = if sums.len() > 2 {
+            third * r / ((r - 1.0) * (r - 2.0))
+        } else {
+            0.0
+        };
+        let covariance = third / (r.sqrt() * n.powf(1.5));
+        Spread {
+            mean,
+            variance: sigma2 / n,
+            variance_of_variance: of_sigma2 / (n * n),
+            covariance,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Window;
+    use super::*;
+    use crate::math::Rgb;
+    use crate::sampler::{Sampler, SamplerKind};
+
+    fn film_of_noise(seed: u64, spp: u64) -> Film {
+        let window = Window {
+            x: 0,
+            y: 0,
+            width: 40,
+            height: 25,
+        };
+        let mut film = Film::new(window, super::super::replicates(Some(spp), 1000), 0);
+        for tile in film.tiles_mut() {
+            for y in 0..tile.height {
+                for x in 0..tile.width {
+                    let pixel = u64::from((tile.y + y) * 40 + tile.x + x);
+                    for s in 0..spp {
+                        let u = Sampler::new(SamplerKind::Independent, seed, pixel, s, 1).get4(0);
+                        tile.add(x, y, s, Rgb::new(u[0], 2.0 * u[1], u[2] * u[2]));
+                    }
+                }
+            }
+        }
+        film.finish_pass(spp);
+        film
+    }
+
+    #[test]
+    fn intervals_cover_the_truth_as_often_as_they_say() {
+        // Also with unequal replicates (50 = 16 * 3 + 2).
+        for spp in [50, 64] {
+            let film = film_of_noise(5, spp);
+            let t = student_t_95(film.replicates() - 1);
+            let truth = [0.5, 1.0, 1.0 / 3.0];
+            let (mean, stderr) = (film.mean(), film.standard_error());
+            let covered = mean
+                .iter()
+                .zip(&stderr)
+                .flat_map(|(m, s)| (0..3).map(move |c| (m[c] - truth[c]).abs() < t * s[c]))
+                .filter(|inside| *inside)
+                .count();
+            // 3000 independent intervals: 95 % with a standard deviation of 0.4 %.
+            assert!((2800..=2900).contains(&covered), "{covered} of 3000");
+        }
+    }
+
+    #[test]
+    fn estimated_relmse_interval_holds_the_actual_one() {
+        let truth = [0.5, 1.0, 1.0 / 3.0];
+        let inside = |seed: &u64| {
+            let film = film_of_noise(*seed, 32);
+            let sum: f64 = film
+                .mean()
+                .iter()
+                .flat_map(|m| {
+                    (0..3).map(move |c| {
+                        (m[c] - truth[c]).powi(2) / (truth[c] * truth[c] + RELMSE_FLOOR)
+                    })
+                })
+                .sum();
+            let actual = sum / 3000.0;
+            let estimate = film.estimate_error().unwrap();
+            estimate.ci95[0] <= actual && actual <= estimate.ci95[1]
+        };
+        let hits = (0..100).filter(inside).count();
+        // Binomial(100, 0.95): outside 88..=100 with probability 0.4 %.
+        assert!(hits >= 88, "{hits} of 100");
+    }
+
+    #[test]
+    fn a_constant_picture_has_no_error() {
+        let mut film = Film::new(
+            Window {
+                x: 0,
+                y: 0,
+                width: 3,
+                height: 2,
+            },
+            16,
+            0,
+        );
+        for tile in film.tiles_mut() {
+            for s in 0..32 {
+                for x in 0..3 {
+                    for y in 0..2 {
+                        tile.add(x, y, s, Rgb::splat(0.25));
+                    }
+                }
+            }
+        }
+        film.finish_pass(32);
+        assert_eq!(film.estimate_error().unwrap().relmse, 0.0);
+        assert!(film.mean().iter().all(|m| *m == [0.25; 3]));
+    }
+
+    #[test]
+    fn student_quantiles_match_the_tables() {
+        for (dof, t) in [
+            (3, 3.182),
+            (4, 2.776),
+            (7, 2.365),
+            (15, 2.131),
+            (100, 1.984),
+        ] {
+            assert!((student_t_95(dof) - t).abs() < 0.003 * t, "{dof}");
+        }
+    }
+}
