@@ -1,0 +1,171 @@
+//! The camera walk: unidirectional path tracing with next-event estimation.
+
+use crate::bsdf::Density;
+use crate::geom::{Hit, Ray};
+use crate::math::{Rgb, Vec2};
+use crate::sampler::{Sampler, dim};
+use crate::scene::Scene;
+
+use super::{Mis, PathStats, direct_light, numbers_at};
+
+/// Longest path, in path vertices after the camera, when none is asked for: longer ones are cut. Only a
+/// closed scene of albedo 1 without Russian roulette gets here.
+const UNBOUNDED: u32 = 1 << 20;
+
+/// Settings of the path tracer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PathSpec {
+    /// Most edges of a path from eye to light; 1 sees emitters only, 2 adds direct light. `None`: no limit.
+    pub max_depth: Option<u32>,
+    /// Edges from which on Russian roulette may end a path.
+    pub rr_depth: u32,
+    /// Leave emitters black where the camera sees them directly.
+    pub hide_emitters: bool,
+}
+
+/// Settings of the direct-light integrator: the light and the BSDF are sampled this often per camera ray.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DirectSpec {
+    pub emitter_samples: u32,
+    pub bsdf_samples: u32,
+    pub hide_emitters: bool,
+}
+
+/// The last vertex of the walk and how the direction away from it was chosen: what MIS needs when that
+/// direction meets an emitter.
+#[derive(Clone, Copy)]
+struct Departure<'a> {
+    from: &'a Hit,
+    density: Density,
+    /// Light samples per BSDF sample at that vertex.
+    light_per_bsdf: f32,
+}
+
+impl Departure<'_> {
+    fn weight(&self, light_pdf: impl FnOnce() -> f32) -> f32 {
+        match self.density {
+            Density::Delta => 1.0,
+            _ if self.light_per_bsdf == 0.0 => 1.0,
+            density => density.mis_weight(light_pdf() * self.light_per_bsdf),
+        }
+    }
+}
+
+/// Radiance emitted towards the walk by what `ray` met, weighted against next-event estimation.
+#[inline]
+fn emission(scene: &Scene, ray: &Ray, met: Option<&Hit>, departure: Option<Departure>) -> Rgb {
+    let le = match met {
+        Some(hit) => scene.le(hit),
+        None => scene.le_escaped(ray.d),
+    };
+    match departure {
+        Some(departure) if !le.is_black() => {
+            le * departure.weight(|| match met {
+                Some(hit) => scene.pdf_light(departure.from, hit),
+                None => scene.pdf_light_escaped(departure.from, ray.d),
+            })
+        }
+        _ => le,
+    }
+}
+
+impl PathSpec {
+    /// One sample of the radiance along `ray` (Kajiya 1986; MIS as Veach 1997, section 10.3.1).
+    pub fn li(&self, scene: &Scene, mut ray: Ray, sampler: &Sampler, stats: &mut PathStats) -> Rgb {
+        let max_depth = self.max_depth.unwrap_or(UNBOUNDED);
+        let (mut lo, mut throughput) = (Rgb::BLACK, Rgb::WHITE);
+        // Product of the squared relative indices of refraction: takes the compression of radiance in a
+        // dense medium out of the roulette's decision.
+        let mut eta2 = 1.0;
+        let mut last: Option<(Hit, Density)> = None;
+        stats.camera += 1;
+        for depth in 0..max_depth {
+            let met = scene.intersect(&ray);
+            let departure =
+                last.as_ref().map(|(from, density)| Departure { from, density: *density, light_per_bsdf: 1.0 });
+            if depth > 0 || !self.hide_emitters {
+                lo += throughput * emission(scene, &ray, met.as_ref(), departure);
+            }
+            let Some(hit) = met else {
+                break;
+            };
+            if depth + 1 >= max_depth {
+                break;
+            }
+            let bsdf = scene.bsdf(&hit);
+            if !bsdf.is_delta() && scene.has_lights() {
+                let mis = Mis::Power { bsdf_per_light: 1.0 };
+                let numbers = numbers_at(sampler, depth, dim::LIGHT);
+                lo += throughput * direct_light(scene, &hit, &bsdf, mis, numbers, stats);
+            }
+            // The last edge could only meet an emitter.
+            if depth + 2 >= max_depth && !scene.emitters_can_be_met() {
+                break;
+            }
+            let [u, v, u_lobe, u_roulette] = numbers_at(sampler, depth, dim::BSDF);
+            let Some(sample) = bsdf.sample(hit.frame.to_local(hit.wo), u_lobe, Vec2::new(u, v)) else {
+                break;
+            };
+            throughput *= sample.weight;
+            eta2 *= sample.eta * sample.eta;
+            if depth + 1 >= self.rr_depth {
+                let survival = (throughput.max_component() * eta2).min(0.95);
+                if u_roulette >= survival {
+                    break;
+                }
+                throughput *= 1.0 / survival;
+            }
+            if throughput.is_black() {
+                break;
+            }
+            ray = hit.spawn(hit.frame.to_world(sample.wi));
+            stats.indirect += 1;
+            last = Some((hit, sample.density));
+        }
+        lo
+    }
+}
+
+impl DirectSpec {
+    /// One sample of the emission seen and of the direct light reflected along `ray`.
+    pub fn li(&self, scene: &Scene, ray: Ray, sampler: &Sampler, stats: &mut PathStats) -> Rgb {
+        stats.camera += 1;
+        let met = scene.intersect(&ray);
+        let mut lo = Rgb::BLACK;
+        if !self.hide_emitters {
+            lo += emission(scene, &ray, met.as_ref(), None);
+        }
+        let Some(hit) = met else {
+            return lo;
+        };
+        let bsdf = scene.bsdf(&hit);
+        let (n_light, n_bsdf) = (self.emitter_samples as f32, self.bsdf_samples as f32);
+        if !bsdf.is_delta() && scene.has_lights() {
+            let mis = match self.bsdf_samples {
+                0 => Mis::LightOnly,
+                _ => Mis::Power { bsdf_per_light: n_bsdf / n_light },
+            };
+            for i in 0..self.emitter_samples {
+                let numbers = numbers_at(sampler, i, dim::LIGHT);
+                lo += direct_light(scene, &hit, &bsdf, mis, numbers, stats) * (1.0 / n_light);
+            }
+        }
+        if !scene.emitters_can_be_met() {
+            return lo;
+        }
+        let wo = hit.frame.to_local(hit.wo);
+        for i in 0..self.bsdf_samples {
+            let [u, v, u_lobe, _] = numbers_at(sampler, i, dim::BSDF);
+            let Some(sample) = bsdf.sample(wo, u_lobe, Vec2::new(u, v)) else {
+                continue;
+            };
+            let ray = hit.spawn(hit.frame.to_world(sample.wi));
+            stats.indirect += 1;
+            let departure =
+                Departure { from: &hit, density: sample.density, light_per_bsdf: n_light / n_bsdf };
+            let met = scene.intersect(&ray);
+            lo += sample.weight * emission(scene, &ray, met.as_ref(), Some(departure)) * (1.0 / n_bsdf);
+        }
+        lo
+    }
+}
