@@ -3,6 +3,9 @@
 //! Traversal returns little ([`RawHit`]); shading data ([`Hit`]) is computed once, for the hit that won.
 //! All coordinates are f32 and relative to the centre of the scene (see `format::compile`).
 
+pub mod accel;
+pub mod wide;
+
 use crate::math::{Frame, Vec2, Vec3, fp};
 
 /// A half-line or segment. `d` has unit length, so `t_max` is a distance.

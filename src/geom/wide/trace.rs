@@ -1,0 +1,335 @@
+//! Traversal and the triangle test, over any instruction set.
+//!
+//! Triangles: Woop, Benthin & Wald 2013, "Watertight ray/triangle intersection". A ray that meets a
+//! closed mesh meets one of its triangles, also exactly on an edge or a corner, because neighbours
+//! compute the sign of a shared edge from the same numbers, and a sign lost to rounding is found again
+//! in double precision. Boxes: Ize 2013, "Robust BVH ray traversal", with a margin that also covers
+//! the rounding of the triangle test, so that no box hides what the triangle test would accept.
+
+use super::isa::Isa;
+use super::stack::{Entry, Stack};
+use super::{Child, Lanes, OTHER, Pack, Wide};
+use crate::geom::Ray;
+use crate::math::{Vec2, fp};
+
+/// What was met.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Found {
+    /// Distance, `0 < t <= ray.t_max`.
+    pub t: f32,
+    /// Number of the triangle, or [`OTHER`] plus the number of another primitive.
+    pub id: u32,
+    /// Barycentric weights of the second and third corner, or what [`Leaf::other`] gave.
+    pub uv: Vec2,
+}
+
+/// What the tree does not know about its leaves.
+pub trait Leaf {
+    /// Whether [`Leaf::other`] can be reached; otherwise it is compiled out.
+    const OTHERS: bool;
+    /// Whether [`Leaf::accept`] is asked; otherwise it is compiled out.
+    const FILTERS: bool;
+    /// Meeting of `ray`, up to `ray.t_max`, with primitive `index` that is no triangle.
+    fn other(&self, index: u32, ray: &Ray) -> Option<(f32, Vec2)>;
+    /// Whether a meeting with `triangle` counts (alpha masks).
+    fn accept(&self, triangle: u32, uv: Vec2) -> bool;
+}
+
+/// Error of the box test: entry and exit carry three roundings each (subtraction, product, and the
+/// inverse); the triangle test moves the point where the ray passes by up to four roundings relative
+/// to each offset from the origin, on two axes.
+const BOX_MARGIN: f32 = 1.0 + fp::gamma(14 + 1);
+
+/// The ray as the triangle test wants it (section 3.1 of the paper): the axis of the largest
+/// direction component is `z`, and x and y are sheared so that the ray runs along it. The paper swaps
+/// x and y to keep the winding; we take both sides, so the sign of the determinant is free.
+struct Shear {
+    x: usize,
+    y: usize,
+    z: usize,
+    sx: f32,
+    sy: f32,
+    sz: f32,
+}
+
+impl Shear {
+    #[inline(always)]
+    fn new(ray: &Ray) -> Shear {
+        let d = ray.d.abs();
+        let z = if d.x > d.y {
+            if d.x > d.z { 0 } else { 2 }
+        } else if d.y > d.z {
+            1
+        } else {
+            2
+        };
+        let (x, y) = [(1, 2), (2, 0), (0, 1)][z];
+        let d = ray.d.to_array();
+        Shear {
+            x,
+            y,
+            z,
+            sx: d[x] / d[z],
+            sy: d[y] / d[z],
+            sz: 1.0 / d[z],
+        }
+    }
+}
+
+/// Traverse. With `ANY` the first meeting found ends the search.
+#[inline(always)]
+pub fn trace<I: Isa, L: Leaf, const ANY: bool>(
+    isa: I,
+    wide: &Wide,
+    ray: &Ray,
+    leaf: &L,
+) -> Option<Found> {
+    if wide.root == Child::EMPTY {
+        return None;
+    }
+    let (o, d) = (ray.o.to_array(), ray.d.to_array());
+    // An inverse of infinity is right: times a plain non-zero offset it gives an infinity of the right
+    // sign, times zero (the origin lies in the plane) a NaN, which `max` and `min` below pass over.
+    let inv = d.map(|d| 1.0 / d);
+    let side = inv.map(|i| usize::from(i.is_sign_negative()));
+    let (ov, iv) = (o.map(|x| isa.splat(x)), inv.map(|x| isa.splat(x)));
+    let zero = isa.splat(0.0);
+    let margin = isa.splat(BOX_MARGIN);
+    let shear = Shear::new(ray);
+
+    let mut search = Search {
+        // `t < best` is the test, and `t_max` itself is inside.
+        best: ray.t_max.next_up(),
+        found: None,
+    };
+    let mut limit = search.best * BOX_MARGIN;
+    let mut limit_v = isa.splat(limit);
+    let mut stack = Stack::new();
+    let mut current = wide.root;
+    loop {
+        while !current.is_leaf() {
+            let node = &wide.nodes[current.0 as usize];
+            let near = |a: usize| isa.load(&node.planes[side[a] & 1][a]);
+            let far = |a: usize| isa.load(&node.planes[!side[a] & 1][a]);
+            let slab = |plane: I::F, a: usize| isa.mul(isa.sub(plane, ov[a]), iv[a]);
+            // The second operand wins over a NaN, so the ends of the chain must not be one.
+            let enter = isa.max(slab(near(1), 1), isa.max(slab(near(2), 2), zero));
+            let enter = isa.max(slab(near(0), 0), enter);
+            let leave = isa.min(
+                slab(far(1), 1),
+                isa.min(slab(far(2), 2), isa.splat(f32::MAX)),
+            );
+            let leave = isa.min(slab(far(0), 0), leave);
+            let leave = isa.min(isa.mul(leave, margin), limit_v);
+            let mut hits = isa.le(enter, leave);
+            if hits == 0 {
+                current = Child::EMPTY;
+                break;
+            }
+            let mut next = || {
+                let slot = hits.trailing_zeros() as usize & 7;
+                hits &= hits - 1;
+                (slot, hits != 0)
+            };
+            let (first, more) = next();
+            current = node.child[first];
+            wide.prefetch(isa, current);
+            if !more {
+                continue;
+            }
+            if ANY {
+                loop {
+                    let (slot, more) = next();
+                    stack.push(Entry::new(node.child[slot], 0.0));
+                    if !more {
+                        break;
+                    }
+                }
+                continue;
+            }
+            let enter = isa.store(enter);
+            let base = stack.len();
+            stack.push(Entry::new(current, enter.0[first]));
+            loop {
+                let (slot, more) = next();
+                let child = node.child[slot];
+                wide.prefetch(isa, child);
+                stack.insert(base, Entry::new(child, enter.0[slot]));
+                if !more {
+                    break;
+                }
+            }
+            match stack.pop() {
+                Some(e) => current = e.child(),
+                None => break,
+            }
+        }
+
+        if current != Child::EMPTY {
+            let (first, count) = (current.leaf_index(), current.pack_count());
+            let mut hit = false;
+            if L::OTHERS && count == 0 {
+                hit = search.other(first as u32, ray, leaf);
+            }
+            for pack in &wide.packs[first..first + count] {
+                hit |= search.pack(isa, pack, &o, &shear, leaf);
+                if ANY && hit {
+                    return search.found;
+                }
+            }
+            if ANY && hit {
+                return search.found;
+            }
+            if hit {
+                limit = search.best * BOX_MARGIN;
+                limit_v = isa.splat(limit);
+            }
+        }
+        loop {
+            let Some(e) = stack.pop() else {
+                return search.found;
+            };
+            if ANY || e.t() <= limit {
+                current = e.child();
+                break;
+            }
+        }
+    }
+}
+
+impl Wide {
+    #[inline(always)]
+    fn prefetch<I: Isa>(&self, isa: I, child: Child) {
+        if child.is_leaf() {
+            isa.prefetch(self.packs.as_ptr().wrapping_add(child.leaf_index()));
+        } else {
+            isa.prefetch(self.nodes.as_ptr().wrapping_add(child.0 as usize));
+        }
+    }
+}
+
+/// The best so far.
+struct Search {
+    /// What is met must be nearer than this.
+    best: f32,
+    found: Option<Found>,
+}
+
+impl Search {
+    #[inline(always)]
+    fn keep(&mut self, t: f32, id: u32, uv: Vec2) {
+        self.best = t;
+        self.found = Some(Found { t, id, uv });
+    }
+
+    #[inline(always)]
+    fn other<L: Leaf>(&mut self, index: u32, ray: &Ray, leaf: &L) -> bool {
+        let ray = Ray {
+            t_max: self.best,
+            ..*ray
+        };
+        match leaf.other(index, &ray) {
+            Some((t, uv)) if t > 0.0 && t < self.best => {
+                self.keep(t, OTHER | index, uv);
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// Test eight triangles; true when one is the new best.
+    #[inline(always)]
+    fn pack<I: Isa, L: Leaf>(
+        &mut self,
+        isa: I,
+        pack: &Pack,
+        o: &[f32; 3],
+        s: &Shear,
+        leaf: &L,
+    ) -> bool {
+        let (cx, cy, cz) = (&pack.corner[s.x], &pack.corner[s.y], &pack.corner[s.z]);
+        let (ox, oy, oz) = (isa.splat(o[s.x]), isa.splat(o[s.y]), isa.splat(o[s.z]));
+        let (sx, sy) = (isa.splat(s.sx), isa.splat(s.sy));
+        // Corners relative to the origin, sheared.
+        let z = [0, 1, 2].map(|k| isa.sub(isa.load(&cz[k]), oz));
+        let x = [0, 1, 2].map(|k| isa.sub(isa.sub(isa.load(&cx[k]), ox), isa.mul(sx, z[k])));
+        let y = [0, 1, 2].map(|k| isa.sub(isa.sub(isa.load(&cy[k]), oy), isa.mul(sy, z[k])));
+        // Twice the areas of the triangles that the ray spans with each edge: the edge functions.
+        let edge = |a: usize, b: usize| isa.sub(isa.mul(x[a], y[b]), isa.mul(y[a], x[b]));
+        let (u, v, w) = (edge(2, 1), edge(0, 2), edge(1, 0));
+        let zero = isa.splat(0.0);
+        let least = isa.min(isa.min(u, v), w);
+        let most = isa.max(isa.max(u, v), w);
+        let inside = isa.le(zero, least) | isa.le(most, zero);
+        if inside == 0 {
+            return false;
+        }
+        let exact = inside & (isa.eq(u, zero) | isa.eq(v, zero) | isa.eq(w, zero));
+
+        let det = isa.add(isa.add(u, v), w);
+        let depth = isa.add(
+            isa.add(isa.mul(u, z[0]), isa.mul(v, z[1])),
+            isa.mul(w, z[2]),
+        );
+        let t = isa.div(isa.mul(isa.splat(s.sz), depth), det);
+        let mut hits = isa.lt(zero, t) & isa.lt(t, isa.splat(self.best)) & inside & !exact;
+        let mut hit = false;
+        if hits != 0 {
+            let (t, v, w, det) = (isa.store(t), isa.store(v), isa.store(w), isa.store(det));
+            while hits != 0 {
+                let i = hits.trailing_zeros() as usize & 7;
+                hits &= hits - 1;
+                if t.0[i] < self.best {
+                    let uv = Vec2::new(v.0[i] / det.0[i], w.0[i] / det.0[i]);
+                    if !L::FILTERS || leaf.accept(pack.id[i], uv) {
+                        self.keep(t.0[i], pack.id[i], uv);
+                        hit = true;
+                    }
+                }
+            }
+        }
+        if exact != 0 {
+            let lanes = [x, y, z].map(|axis| axis.map(|v| isa.store(v)));
+            hit |= self.exact(exact, &lanes, pack, s.sz, leaf);
+        }
+        hit
+    }
+
+    /// The lanes in which an edge function came out as zero, again in double precision: products of
+    /// floats are exact there and so is the sign of their difference. The signs found in single
+    /// precision stand, since rounding is monotonic; so neighbours still agree. Zero-area triangles
+    /// have a zero determinant and end here.
+    #[cold]
+    #[inline(never)]
+    fn exact<L: Leaf>(
+        &mut self,
+        mut lanes: u32,
+        corners: &[[Lanes<f32>; 3]; 3],
+        pack: &Pack,
+        sz: f32,
+        leaf: &L,
+    ) -> bool {
+        let mut hit = false;
+        while lanes != 0 {
+            let i = lanes.trailing_zeros() as usize & 7;
+            lanes &= lanes - 1;
+            let [x, y, z] = corners
+                .each_ref()
+                .map(|a| [0, 1, 2].map(|k| f64::from(a[k].0[i])));
+            let edge = |a: usize, b: usize| x[a] * y[b] - y[a] * x[b];
+            let (u, v, w) = (edge(2, 1), edge(0, 2), edge(1, 0));
+            let det = u + v + w;
+            let mixed = u.min(v).min(w) < 0.0 && u.max(v).max(w) > 0.0;
+            if mixed || det == 0.0 {
+                continue;
+            }
+            let t = (f64::from(sz) * (u * z[0] + v * z[1] + w * z[2]) / det) as f32;
+            let uv = Vec2::new((v / det) as f32, (w / det) as f32);
+            if t > 0.0 && t < self.best && (!L::FILTERS || leaf.accept(pack.id[i], uv)) {
+                self.keep(t, pack.id[i], uv);
+                hit = true;
+            }
+        }
+        hit
+    }
+}
