@@ -4,9 +4,15 @@
 //! All coordinates are f32 and relative to the centre of the scene (see `format::compile`).
 
 pub mod accel;
+pub mod analytic;
+pub mod mesh;
 pub mod wide;
 
-use crate::math::{Frame, Vec2, Vec3, fp};
+pub use accel::{Accel, Hooks, MeshRef};
+pub use analytic::{Cylinder, Disk, Sphere};
+pub use mesh::{Mesh, MeshError};
+
+use crate::math::{Aabb, Frame, Vec2, Vec3, fp};
 
 /// A half-line or segment. `d` has unit length, so `t_max` is a distance.
 #[derive(Clone, Copy, Debug)]
@@ -101,4 +107,121 @@ impl Endpoint {
     pub fn offset_towards(&self, o: Vec3) -> Vec3 {
         fp::offset_origin(self.p, self.p_err, self.ng, o - self.p)
     }
+}
+
+/// A point drawn on a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfaceSample {
+    pub p: Vec3,
+    /// Bound on the error of `p`, per axis.
+    pub p_err: Vec3,
+    /// Geometric and shading normal, as in [`Hit`].
+    pub ng: Vec3,
+    pub ns: Vec3,
+    pub uv: Vec2,
+    /// Density per unit of area.
+    pub pdf_a: f32,
+}
+
+/// Any shape of the scene, in centred world coordinates.
+#[derive(Clone, Debug)]
+pub enum Geometry {
+    Mesh(Mesh),
+    Sphere(Sphere),
+    Disk(Disk),
+    Cylinder(Cylinder),
+}
+
+impl Geometry {
+    pub fn bounds(&self) -> Aabb {
+        match self {
+            Geometry::Mesh(s) => s.bounds(),
+            Geometry::Sphere(s) => s.bounds(),
+            Geometry::Disk(s) => s.bounds(),
+            Geometry::Cylinder(s) => s.bounds(),
+        }
+    }
+
+    pub fn area(&self) -> f64 {
+        match self {
+            Geometry::Mesh(s) => s.area(),
+            Geometry::Sphere(s) => s.area(),
+            Geometry::Disk(s) => s.area(),
+            Geometry::Cylinder(s) => s.area(),
+        }
+    }
+
+    /// Triangles of a mesh; 1 for any other shape.
+    pub fn prim_count(&self) -> u32 {
+        match self {
+            Geometry::Mesh(s) => s.indices().len() as u32,
+            _ => 1,
+        }
+    }
+
+    /// Area of triangle `prim` of a mesh, or of the whole of any other shape.
+    pub fn prim_area(&self, prim: u32) -> f64 {
+        match self {
+            Geometry::Mesh(s) => s.triangle_area(prim),
+            _ => self.area(),
+        }
+    }
+
+    /// Distance of the first meeting in (0, t_max] and the surface parameters to keep for
+    /// [`Geometry::hit`]. For meshes always `None`: their triangles belong to the acceleration structure.
+    #[inline]
+    pub fn intersect_analytic(&self, ray: &Ray, t_max: f32) -> Option<(f32, Vec2)> {
+        match self {
+            Geometry::Mesh(_) => None,
+            Geometry::Sphere(s) => s.intersect(ray, t_max),
+            Geometry::Disk(s) => s.intersect(ray, t_max),
+            Geometry::Cylinder(s) => s.intersect(ray, t_max),
+        }
+    }
+
+    /// All that shading needs at the meeting `raw` of `ray` with this shape.
+    pub fn hit(&self, ray: &Ray, raw: &RawHit) -> Hit {
+        let point = match self {
+            Geometry::Mesh(m) => return m.hit(ray, raw),
+            Geometry::Sphere(s) => s.at_hit(ray, raw.t),
+            Geometry::Disk(s) => s.at_hit(ray),
+            Geometry::Cylinder(s) => s.at_hit(ray, raw.t),
+        };
+        Hit {
+            p: point.p.as_vec3(),
+            p_err: point.p_err,
+            ng: point.n,
+            frame: Frame::from_tangent(point.n, point.dp_du.as_vec3()),
+            uv: point.uv,
+            wo: -ray.d,
+            shape: raw.shape,
+            prim: raw.prim,
+        }
+    }
+
+    /// dp/du and dp/dv at a hit on this shape, for bump maps; either is zero where it is undefined.
+    pub fn dp_duv(&self, hit: &Hit) -> (Vec3, Vec3) {
+        let point = match self {
+            Geometry::Mesh(m) => return m.dp_duv(hit.prim),
+            Geometry::Sphere(s) => s.at_point(hit.p),
+            Geometry::Disk(s) => s.at_point(hit.p),
+            Geometry::Cylinder(s) => s.at_point(hit.p),
+        };
+        (point.dp_du.as_vec3(), point.dp_dv.as_vec3())
+    }
+
+    /// A point of triangle `prim` (of the whole shape if it is no mesh), uniform over the area.
+    pub fn sample_area(&self, prim: u32, u: Vec2) -> SurfaceSample {
+        match self {
+            Geometry::Mesh(m) => m.surface_sample(prim, mesh::uniform_barycentric(u)),
+            Geometry::Sphere(s) => s.sample_area(u),
+            Geometry::Disk(s) => s.sample_area(u),
+            Geometry::Cylinder(s) => s.sample_area(u),
+        }
+    }
+}
+
+/// Density of the uniform distribution over `area`, kept finite for areas that f32 cannot hold.
+fn reciprocal_density(area: f64) -> f32 {
+    (1.0 / area).min(f32::MAX as f64) as f32
 }
