@@ -11,7 +11,7 @@ pub mod quadrature;
 pub mod stats;
 
 pub use plan::{Chi2Plan, Domain};
-pub use stats::{chi2_p_value, normal_p_value, sidak};
+pub use stats::{chi2_p_value, sidak};
 
 use luxel::math::Vec2;
 use rand_pcg::Pcg32;

@@ -4,13 +4,14 @@ use super::Rng;
 use super::quadrature::{self, Box2, Moments};
 use super::stats::{chi2_p_value, normal_p_value, sidak};
 use luxel::math::{DVec3, Vec3};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 /// Where samples live. Each domain has two coordinates in which its measure is the plane area.
 #[derive(Clone, Copy, Debug)]
 pub enum Domain {
-    /// Unit directions: `1 - z` in [0, 2] and the azimuth.
-    Sphere,
+    /// Unit directions of height `1 - z` of at most this (2: the sphere, 1: the upper hemisphere), and the
+    /// azimuth. A density that ends in a step at the rim needs the rim to be the end of the domain.
+    Cap(f64),
     /// x and y in a box, z ignored.
     Plane { lo: [f64; 2], hi: [f64; 2] },
 }
@@ -18,9 +19,9 @@ pub enum Domain {
 impl Domain {
     fn bounds(self) -> Box2 {
         match self {
-            Domain::Sphere => Box2 {
+            Domain::Cap(height) => Box2 {
                 lo: [0.0, -PI],
-                hi: [2.0, PI],
+                hi: [height, PI],
             },
             Domain::Plane { lo, hi } => Box2 { lo, hi },
         }
@@ -29,7 +30,7 @@ impl Domain {
     fn coordinates(self, p: Vec3) -> [f64; 2] {
         let p = p.as_dvec3();
         match self {
-            Domain::Sphere => {
+            Domain::Cap(_) => {
                 // 1 - z without cancellation: lobes around the normal may be 1e-4 wide.
                 let r2 = p.x * p.x + p.y * p.y;
                 let h = if p.z > 0.0 {
@@ -45,7 +46,7 @@ impl Domain {
 
     fn point(self, [a, b]: [f64; 2]) -> DVec3 {
         match self {
-            Domain::Sphere => {
+            Domain::Cap(_) => {
                 let r = (a * (2.0 - a)).max(0.0).sqrt();
                 DVec3::new(r * b.cos(), r * b.sin(), 1.0 - a)
             }
@@ -88,14 +89,8 @@ impl Tree {
             self.leaves[node - self.splits.len()] = bounds;
             return;
         }
-        // Across the wider spread of the points relative to the box: leaves follow the density.
-        let spread = |axis: usize| {
-            let (lo, hi) = points.iter().fold((f64::MAX, f64::MIN), |(lo, hi), p| {
-                (lo.min(p[axis]), hi.max(p[axis]))
-            });
-            (hi - lo) / (bounds.hi[axis] - bounds.lo[axis])
-        };
-        let axis = usize::from(spread(1) > spread(0));
+        // Axes by turns: a box long on one axis with all its points at one end would hide its density.
+        let axis = (node.ilog2() % 2) as usize;
         let mid = points.len() / 2;
         let mut at = bounds.middle(axis);
         if !points.is_empty() {
@@ -123,12 +118,12 @@ impl Tree {
 }
 
 impl Chi2Plan {
-    /// 10^6 directions.
-    pub fn sphere(alpha: f64) -> Chi2Plan {
+    /// 10^6 directions of the cap of this height: 2 is the sphere, 1 the upper hemisphere.
+    pub fn cap(height: f64, alpha: f64) -> Chi2Plan {
         Chi2Plan {
             samples: 1_000_000,
             alpha,
-            domain: Domain::Sphere,
+            domain: Domain::Cap(height),
         }
     }
 
@@ -162,7 +157,7 @@ impl Chi2Plan {
         let mut expected = vec![0.0; CELLS];
         let mut total = [0.0; 4];
         for (i, &leaf) in tree.leaves.iter().enumerate() {
-            let m = quadrature::integrate(&density, leaf, 2e-8, 7);
+            let m = quadrature::integrate(&density, leaf, 2e-8, 0.3 / LEAVES as f64);
             expected[i * CELLS / LEAVES] += m[0];
             total = quadrature::add(total, m);
         }
@@ -171,9 +166,12 @@ impl Chi2Plan {
         let (mut sum, mut sum2, mut n) = (DVec3::ZERO, DVec3::ZERO, 0u64);
         for _ in 0..self.samples {
             if let Some(p) = sample(&mut rng) {
-                counts[tree.find(self.domain.coordinates(p)) * CELLS / LEAVES] += 1;
+                let c = self.domain.coordinates(p);
+                let inside = (0..2).all(|i| c[i] >= bounds.lo[i] && c[i] <= bounds.hi[i]);
+                assert!(inside, "{name}: sample {p} lies outside");
+                counts[tree.find(c) * CELLS / LEAVES] += 1;
                 let d = match self.domain {
-                    Domain::Sphere => p.as_dvec3() - center,
+                    Domain::Cap(_) => p.as_dvec3() - center,
                     Domain::Plane { .. } => {
                         DVec3::new(f64::from(p.x), f64::from(p.y), 0.0) - center
                     }

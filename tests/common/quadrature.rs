@@ -40,19 +40,45 @@ impl Box2 {
     }
 }
 
+/// How often a box may be quartered, and how often it is when it looks too empty.
+const DEPTH: u32 = 12;
+const FORCED: u32 = 4;
+
 /// Integral of `f` over the box, refined where two rules disagree by more than `tolerance` (absolute, of
-/// the first moment).
-pub fn integrate(f: &impl Fn([f64; 2]) -> Moments, b: Box2, tolerance: f64, depth: u32) -> Moments {
-    let coarse = rule(f, b, &G3);
-    let fine = rule(f, b, &G5);
-    if depth == 0 || (coarse[0] - fine[0]).abs() <= tolerance {
+/// the first moment). A box is expected to hold at least `least`: when it seems to hold less, a peak may
+/// hide between the nodes, and it is looked at more closely.
+pub fn integrate(f: &impl Fn([f64; 2]) -> Moments, b: Box2, tolerance: f64, least: f64) -> Moments {
+    let (coarse, fine) = (rule(f, b, &G3), rule(f, b, &G5));
+    if (coarse[0] - fine[0]).abs() <= tolerance && fine[0] >= least {
         return fine;
     }
+    let forced = if fine[0] < least { FORCED } else { 1 };
+    quarters(f, b, tolerance, DEPTH, forced)
+}
+
+fn quarters(
+    f: &impl Fn([f64; 2]) -> Moments,
+    b: Box2,
+    tolerance: f64,
+    depth: u32,
+    forced: u32,
+) -> Moments {
     let [left, right] = b.split(0, b.middle(0));
     let mut sum = [0.0; 4];
     for half in [left, right] {
         for quarter in half.split(1, half.middle(1)) {
-            sum = add(sum, integrate(f, quarter, tolerance * 0.5, depth - 1));
+            let refine = |t| quarters(f, quarter, t, depth - 1, forced.saturating_sub(1));
+            let part = if forced > 1 {
+                refine(tolerance)
+            } else {
+                let (coarse, fine) = (rule(f, quarter, &G3), rule(f, quarter, &G5));
+                if depth == 0 || (coarse[0] - fine[0]).abs() <= tolerance {
+                    fine
+                } else {
+                    refine(0.5 * tolerance)
+                }
+            };
+            sum = add(sum, part);
         }
     }
     sum
