@@ -4,5 +4,6 @@
 pub mod bsdf;
 pub mod film;
 pub mod geom;
+pub mod light;
 pub mod math;
 pub mod sampler;

@@ -227,6 +227,11 @@ impl Sphere {
         }
     }
 
+    /// The surface where the outward normal is along `n`, with the density of uniform area sampling.
+    pub(crate) fn surface_sample(&self, n: DVec3) -> SurfaceSample {
+        self.at_normal(n).sampled(self.area())
+    }
+
     /// The surface next to the point `p`.
     pub(super) fn at_point(&self, p: Vec3) -> SurfacePoint {
         self.at_normal(p.as_dvec3() - self.center)
@@ -236,8 +241,7 @@ impl Sphere {
     pub(super) fn sample_area(&self, u: Vec2) -> SurfaceSample {
         let z = 1.0 - 2.0 * u.x as f64;
         let (r, phi) = ((1.0 - z * z).max(0.0).sqrt(), u.y as f64 * TAU);
-        self.at_normal(DVec3::new(r * phi.cos(), r * phi.sin(), z))
-            .sampled(self.area())
+        self.surface_sample(DVec3::new(r * phi.cos(), r * phi.sin(), z))
     }
 }
 

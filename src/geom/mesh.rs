@@ -348,13 +348,3 @@ impl Mesh {
         mesh
     }
 }
-
-/// Weights `(b1, b2)` of the second and third corner, uniform over the triangle. Method: Heitz 2019,
-/// "A Low-Distortion Map Between Triangle and Square", which keeps strata compact.
-pub(crate) fn uniform_barycentric(u: Vec2) -> Vec2 {
-    if u.y > u.x {
-        Vec2::new(0.5 * u.x, u.y - 0.5 * u.x)
-    } else {
-        Vec2::new(u.x - 0.5 * u.y, 0.5 * u.y)
-    }
-}

@@ -12,7 +12,7 @@ pub use accel::{Accel, Hooks, MeshRef};
 pub use analytic::{Cylinder, Disk, Sphere};
 pub use mesh::{Mesh, MeshError};
 
-use crate::math::{Aabb, Frame, Vec2, Vec3, fp};
+use crate::math::{Aabb, Frame, Vec2, Vec3, fp, warp};
 
 /// A half-line or segment. `d` has unit length, so `t_max` is a distance.
 #[derive(Clone, Copy, Debug)]
@@ -213,7 +213,7 @@ impl Geometry {
     /// A point of triangle `prim` (of the whole shape if it is no mesh), uniform over the area.
     pub fn sample_area(&self, prim: u32, u: Vec2) -> SurfaceSample {
         match self {
-            Geometry::Mesh(m) => m.surface_sample(prim, mesh::uniform_barycentric(u)),
+            Geometry::Mesh(m) => m.surface_sample(prim, warp::triangle(u)),
             Geometry::Sphere(s) => s.sample_area(u),
             Geometry::Disk(s) => s.sample_area(u),
             Geometry::Cylinder(s) => s.sample_area(u),
