@@ -2,5 +2,6 @@
 #![deny(unsafe_code)]
 
 pub mod bsdf;
+pub mod format;
 pub mod geom;
 pub mod math;
