@@ -3,6 +3,7 @@
 
 pub mod bsdf;
 pub mod film;
+pub mod format;
 pub mod geom;
 pub mod light;
 pub mod math;

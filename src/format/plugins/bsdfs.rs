@@ -1,0 +1,173 @@
+//! Scattering models and textures.
+
+use super::{Category, Default, Kind, Param, Plugin, Range, Role, Slot};
+
+const SPECULAR_R: Param = Param::color(
+    "specular_reflectance",
+    Role::Reflectance,
+    1.0,
+    "Scales reflection; 1 is physical.",
+);
+const SPECULAR_T: Param = Param::color(
+    "specular_transmittance",
+    Role::Reflectance,
+    1.0,
+    "Scales transmission; 1 is physical.",
+);
+const INT_IOR: Param = Param::ior("int_ior", "bk7", "Index of refraction inside.");
+const EXT_IOR: Param = Param::ior("ext_ior", "air", "Index of refraction outside.");
+const MATERIAL: Param = Param {
+    name: "material",
+    kind: Kind::Text,
+    default: Default::Text("none"),
+    doc: "Name of a metal whose eta and k are known; \"none\" is a perfect mirror.",
+};
+const ETA: Param = Param::optional(
+    "eta",
+    Kind::Color(Role::Unbounded),
+    "Real part of the index of refraction; without it, that of the material (0 for \"none\").",
+);
+const K: Param = Param::optional(
+    "k",
+    Kind::Color(Role::Unbounded),
+    "Imaginary part of the index of refraction; without it, that of the material (1 for \"none\").",
+);
+const DISTRIBUTION: Param = Param::choice(
+    "distribution",
+    &["beckmann", "ggx"],
+    "beckmann",
+    "Distribution of microfacet normals.",
+);
+const ALPHA: Param = Param {
+    name: "alpha",
+    kind: Kind::FloatTexture(Range::NonNegative),
+    default: Default::Float(0.1),
+    doc: "Roughness along both tangents.",
+};
+const ALPHA_U: Param = Param::optional(
+    "alpha_u",
+    Kind::FloatTexture(Range::NonNegative),
+    "Roughness along the first tangent; needs alpha_v.",
+);
+const ALPHA_V: Param = Param::optional(
+    "alpha_v",
+    Kind::FloatTexture(Range::NonNegative),
+    "Roughness along the second tangent; needs alpha_u.",
+);
+const SAMPLE_VISIBLE: Param = Param::bool(
+    "sample_visible",
+    true,
+    "Sample the visible normals rather than all.",
+);
+const TO_UV: Param = Param::transform(
+    "to_uv",
+    "Maps texture coordinates before look-up (x and y of the transform).",
+);
+
+const fn bsdf(name: &'static str, params: &'static [Param], doc: &'static str) -> Plugin {
+    Plugin::new(Category::Bsdf, name, params, doc)
+}
+
+pub const PLUGINS: &[Plugin] = &[
+    bsdf(
+        "diffuse",
+        &[Param::color(
+            "reflectance",
+            Role::Reflectance,
+            0.5,
+            "Share of light that is reflected.",
+        )],
+        "Ideally diffuse (Lambertian) reflection, one-sided.",
+    ),
+    Plugin {
+        slots: &[Slot::new(Category::Bsdf, 1, 2)],
+        ..bsdf(
+            "twosided",
+            &[],
+            "Gives a one-sided material to both sides, or the first to the front, the second to the back.",
+        )
+    },
+    Plugin {
+        exclusive: &[("material", "eta"), ("material", "k")],
+        ..bsdf(
+            "conductor",
+            &[MATERIAL, ETA, K, SPECULAR_R],
+            "Smooth metal.",
+        )
+    },
+    Plugin {
+        exclusive: &[
+            ("material", "eta"),
+            ("material", "k"),
+            ("alpha", "alpha_u"),
+            ("alpha", "alpha_v"),
+        ],
+        ..bsdf(
+            "roughconductor",
+            &[
+                DISTRIBUTION,
+                ALPHA,
+                ALPHA_U,
+                ALPHA_V,
+                MATERIAL,
+                ETA,
+                K,
+                SPECULAR_R,
+                SAMPLE_VISIBLE,
+            ],
+            "Rough metal with microfacets.",
+        )
+    },
+    bsdf(
+        "dielectric",
+        &[INT_IOR, EXT_IOR, SPECULAR_R, SPECULAR_T],
+        "Smooth boundary of glass, water and the like; the normal points outside.",
+    ),
+    Plugin::new(
+        Category::Texture,
+        "bitmap",
+        &[
+            Param::file("filename", "The image."),
+            Param::choice(
+                "filter_type",
+                &["bilinear", "nearest"],
+                "bilinear",
+                "Interpolation between pixels.",
+            ),
+            Param::choice(
+                "wrap_mode",
+                &["repeat", "mirror", "clamp"],
+                "repeat",
+                "What lies outside 0 to 1.",
+            ),
+            Param::choice(
+                "format",
+                &["auto", "variant", "float16", "fp16", "uint8"],
+                "auto",
+                "Storage; without effect on the meaning.",
+            ),
+            Param::bool(
+                "raw",
+                false,
+                "Take the numbers as they are, without sRGB decoding.",
+            ),
+            TO_UV,
+        ],
+        "An image.",
+    ),
+    Plugin::new(
+        Category::Texture,
+        "checkerboard",
+        &[
+            Param::color(
+                "color0",
+                Role::Reflectance,
+                0.4,
+                "Colour of the squares at the origin.",
+            ),
+            Param::color("color1", Role::Reflectance, 0.2, "Colour of the others."),
+            TO_UV,
+        ],
+        "Two by two squares per unit of texture coordinates.",
+    ),
+];

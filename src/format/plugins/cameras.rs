@@ -1,0 +1,345 @@
+//! The scene, sensors, films, reconstruction filters, samplers and integrators.
+
+use super::super::limits::IMAGE_SIDE;
+use super::{Category, Default, Kind, Param, Plugin, Range, Slot};
+
+const ANY_NUMBER: usize = usize::MAX;
+const SIDE: (i64, i64) = (1, IMAGE_SIDE);
+
+pub const SCENE: Plugin = Plugin {
+    slots: &[
+        Slot::new(Category::Integrator, 0, 1),
+        Slot::new(Category::Sensor, 0, ANY_NUMBER),
+        Slot::new(Category::Shape, 0, ANY_NUMBER),
+        Slot::new(Category::Emitter, 0, ANY_NUMBER),
+        Slot::new(Category::Bsdf, 0, ANY_NUMBER),
+        Slot::new(Category::Texture, 0, ANY_NUMBER),
+        Slot::new(Category::Film, 0, ANY_NUMBER),
+        Slot::new(Category::Rfilter, 0, ANY_NUMBER),
+        Slot::new(Category::Sampler, 0, ANY_NUMBER),
+    ],
+    ..Plugin::new(
+        Category::Scene,
+        "scene",
+        &[],
+        "The root: what it holds directly is used, or may be referred to by id.",
+    )
+};
+
+const SAMPLES: Param = Param::int(
+    "sample_count",
+    (1, 1 << 31),
+    4,
+    "Samples per pixel; the command line may ask for others.",
+);
+const SEED: Param = Param::int("seed", (0, u32::MAX as i64), 0, "Seed of all numbers.");
+const JITTER: Param = Param::bool("jitter", true, "Random position within each stratum.");
+
+const HIDE: Param = Param::bool(
+    "hide_emitters",
+    false,
+    "Leave emitters out of what the camera sees directly.",
+);
+const PER_PASS: Param = Param::optional(
+    "samples_per_pass",
+    Kind::Int(-1, 1 << 31),
+    "Samples per pass; without effect on the image.",
+);
+const TIMEOUT: Param = Param::float(
+    "timeout",
+    Range::Any,
+    -1.0,
+    "Stop after so many seconds; negative: never.",
+);
+const BLOCK: Param = Param::int(
+    "block_size",
+    (0, IMAGE_SIDE),
+    0,
+    "Side of an image tile, 0: chosen by luxel; without effect on the image.",
+);
+const MAX_DEPTH: Param = Param::int(
+    "max_depth",
+    (-1, i32::MAX as i64),
+    -1,
+    "Longest path in edges: 1 shows emitters, 2 adds direct light; -1: no limit.",
+);
+const RR_DEPTH: Param = Param::int(
+    "rr_depth",
+    (1, i32::MAX as i64),
+    5,
+    "Depth from which Russian roulette may end a path.",
+);
+const INTEGRATORS: &[Slot] = &[Slot::new(Category::Integrator, 0, ANY_NUMBER)];
+
+const fn sampler(name: &'static str, params: &'static [Param], doc: &'static str) -> Plugin {
+    Plugin::new(Category::Sampler, name, params, doc)
+}
+
+const fn rfilter(name: &'static str, params: &'static [Param], doc: &'static str) -> Plugin {
+    Plugin::new(Category::Rfilter, name, params, doc)
+}
+
+const fn integrator(name: &'static str, params: &'static [Param], doc: &'static str) -> Plugin {
+    Plugin::new(Category::Integrator, name, params, doc)
+}
+
+const INT32: (i64, i64) = (0, i32::MAX as i64);
+
+pub const PLUGINS: &[Plugin] = &[
+    integrator(
+        "path",
+        &[MAX_DEPTH, RR_DEPTH, HIDE, PER_PASS, TIMEOUT, BLOCK],
+        "Path tracing with next-event estimation and multiple importance sampling.",
+    ),
+    Plugin {
+        exclusive: &[
+            ("shading_samples", "emitter_samples"),
+            ("shading_samples", "bsdf_samples"),
+        ],
+        ..integrator(
+            "direct",
+            &[
+                Param::int(
+                    "shading_samples",
+                    INT32,
+                    1,
+                    "Sets emitter_samples and bsdf_samples.",
+                ),
+                Param::int(
+                    "emitter_samples",
+                    INT32,
+                    1,
+                    "Samples of the emitters per hit.",
+                ),
+                Param::int("bsdf_samples", INT32, 1, "Samples of the BSDF per hit."),
+                HIDE,
+                PER_PASS,
+                TIMEOUT,
+                BLOCK,
+            ],
+            "Direct light by multiple importance sampling.",
+        )
+    },
+    Plugin {
+        slots: INTEGRATORS,
+        ..integrator(
+            "moment",
+            &[HIDE, PER_PASS, TIMEOUT, BLOCK],
+            "The image of the integrators in it, with its second moment.",
+        )
+    },
+    Plugin {
+        slots: INTEGRATORS,
+        ..integrator(
+            "aov",
+            &[
+                Param {
+                    name: "aovs",
+                    kind: Kind::Text,
+                    default: Default::Required,
+                    doc: "Comma-separated name:type; types: depth position uv geo_normal sh_normal dp_du dp_dv duv_dx duv_dy prim_index shape_index albedo.",
+                },
+                HIDE,
+                PER_PASS,
+                TIMEOUT,
+                BLOCK,
+            ],
+            "Images of properties of the first hit, beside those of the integrators in it.",
+        )
+    },
+    Plugin {
+        slots: &[
+            Slot::new(Category::Film, 0, 1),
+            Slot::new(Category::Sampler, 0, 1),
+        ],
+        exclusive: &[("fov", "focal_length")],
+        ..Plugin::new(
+            Category::Sensor,
+            "perspective",
+            &[
+                Param::optional(
+                    "fov",
+                    Kind::Float(Range::Open(0.0, 180.0)),
+                    "Field of view in degrees along fov_axis; without it, focal_length counts.",
+                ),
+                Param {
+                    name: "focal_length",
+                    kind: Kind::Text,
+                    default: Default::Text("50mm"),
+                    doc: "Focal length of the equivalent 35 mm film (36 x 24 mm), such as 50mm.",
+                },
+                Param::choice(
+                    "fov_axis",
+                    &["x", "y", "diagonal", "smaller", "larger"],
+                    "x",
+                    "Side of the image that fov is measured along.",
+                ),
+                Param::float(
+                    "principal_point_offset_x",
+                    Range::Any,
+                    0.0,
+                    "Shift of the image centre, in image widths.",
+                ),
+                Param::float(
+                    "principal_point_offset_y",
+                    Range::Any,
+                    0.0,
+                    "Shift of the image centre, in image heights.",
+                ),
+                Param::float(
+                    "near_clip",
+                    Range::Positive,
+                    0.01,
+                    "Nearest distance seen, along the axis.",
+                ),
+                Param::float(
+                    "far_clip",
+                    Range::Positive,
+                    1e4,
+                    "Farthest distance seen, along the axis.",
+                ),
+                Param::optional(
+                    "focus_distance",
+                    Kind::Float(Range::Positive),
+                    "Accepted; without effect on a pinhole.",
+                ),
+                Param::float("shutter_open", Range::Any, 0.0, "Time the shutter opens."),
+                Param::float("shutter_close", Range::Any, 0.0, "Time the shutter closes."),
+                Param::transform(
+                    "to_world",
+                    "Places the camera; it looks along +z with +y up and +x to the left.",
+                ),
+            ],
+            "Pinhole camera.",
+        )
+    },
+    Plugin {
+        slots: &[Slot::new(Category::Rfilter, 0, 1)],
+        ..Plugin::new(
+            Category::Film,
+            "hdrfilm",
+            &[
+                Param::int("width", SIDE, 768, "Width of the full image in pixels."),
+                Param::int("height", SIDE, 576, "Height of the full image in pixels."),
+                Param::int(
+                    "crop_offset_x",
+                    (0, IMAGE_SIDE),
+                    0,
+                    "First column of the part to render.",
+                ),
+                Param::int(
+                    "crop_offset_y",
+                    (0, IMAGE_SIDE),
+                    0,
+                    "First row of the part to render.",
+                ),
+                Param::optional(
+                    "crop_width",
+                    Kind::Int(1, IMAGE_SIDE),
+                    "Width of that part; without it, the full width.",
+                ),
+                Param::optional(
+                    "crop_height",
+                    Kind::Int(1, IMAGE_SIDE),
+                    "Height of that part; without it, the full height.",
+                ),
+                Param::choice(
+                    "file_format",
+                    &["openexr", "exr", "pfm", "rgbe"],
+                    "openexr",
+                    "Format of the output file; the name given to -o decides.",
+                ),
+                Param::choice(
+                    "pixel_format",
+                    &["luminance", "luminance_alpha", "rgb", "rgba", "xyz", "xyza"],
+                    "rgb",
+                    "Channels of the image.",
+                ),
+                Param::choice(
+                    "component_format",
+                    &["float16", "float32", "uint32"],
+                    "float16",
+                    "Type of the channels.",
+                ),
+                Param::bool(
+                    "sample_border",
+                    false,
+                    "Sample beyond the border by the filter radius; without effect here.",
+                ),
+                Param::bool(
+                    "compensate",
+                    false,
+                    "Compensated sums; luxel always sums in double precision.",
+                ),
+                Param::bool("banner", true, "Accepted; luxel draws no banner."),
+            ],
+            "Image of floating-point numbers.",
+        )
+    },
+    rfilter("box", &[], "Box of one pixel."),
+    rfilter(
+        "tent",
+        &[Param::float(
+            "radius",
+            Range::Positive,
+            1.0,
+            "Half width in pixels.",
+        )],
+        "Linear fall-off.",
+    ),
+    rfilter(
+        "gaussian",
+        &[Param::float(
+            "stddev",
+            Range::Positive,
+            0.5,
+            "Standard deviation in pixels; cut at four of them.",
+        )],
+        "Gaussian (the default filter).",
+    ),
+    rfilter(
+        "mitchell",
+        &[
+            Param::float("B", Range::Any, 1.0 / 3.0, "B of the family."),
+            Param::float("C", Range::Any, 1.0 / 3.0, "C of the family."),
+        ],
+        "Cubic family of Mitchell and Netravali 1988.",
+    ),
+    rfilter("catmullrom", &[], "Catmull-Rom spline (B = 0, C = 1/2)."),
+    rfilter(
+        "lanczos",
+        &[Param::int("lobes", (1, 64), 3, "Number of lobes.")],
+        "Windowed sinc.",
+    ),
+    sampler("independent", &[SAMPLES, SEED], "Independent numbers."),
+    sampler(
+        "sobol",
+        &[SAMPLES, SEED],
+        "Owen-scrambled Sobol points (Burley 2020); luxel only.",
+    ),
+    sampler(
+        "stratified",
+        &[SAMPLES, SEED, JITTER],
+        "Rendered with the sampler sobol, which is stratified too.",
+    ),
+    sampler(
+        "multijitter",
+        &[SAMPLES, SEED, JITTER],
+        "Rendered with the sampler sobol, which is stratified too.",
+    ),
+    sampler(
+        "orthogonal",
+        &[
+            SAMPLES,
+            SEED,
+            JITTER,
+            Param::int("strength", (2, 64), 2, "Strength of the orthogonal array."),
+        ],
+        "Rendered with the sampler sobol, which is stratified too.",
+    ),
+    sampler(
+        "ldsampler",
+        &[SAMPLES, SEED],
+        "Rendered with the sampler sobol, of low discrepancy too.",
+    ),
+];

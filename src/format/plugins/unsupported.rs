@@ -1,0 +1,200 @@
+//! Plugins that scenes written for Mitsuba may name and luxel does not know, with what to do instead.
+
+use super::Category;
+use Category::{Bsdf, Emitter, Film, Integrator, Sampler, Sensor, Shape, Texture};
+
+const SURFACES: &str = "luxel renders surfaces only; leave participating media out";
+const MESH: &str = "export the shape as a mesh in a PLY or OBJ file";
+const METHOD: &str = "use the integrator \"path\"";
+const DERIVATIVE: &str = "luxel computes no derivatives; use the integrator \"path\"";
+const RGB: &str = "luxel renders in RGB; write the colour with <rgb>";
+const BAKE: &str = "bake the texture into an image and use the texture \"bitmap\"";
+const NEAR_BSDF: &str = "use the nearest of diffuse, conductor, roughconductor and dielectric";
+const PINHOLE: &str = "use the sensor \"perspective\"";
+
+const TABLE: &[(Category, &[&str], &str)] = &[
+    (
+        Shape,
+        &[
+            "serialized",
+            "bsplinecurve",
+            "linearcurve",
+            "ellipsoids",
+            "ellipsoidsmesh",
+            "sdfgrid",
+            "heightfield",
+            "hair",
+            "deformable",
+            "blender",
+            "merge",
+        ],
+        MESH,
+    ),
+    (
+        Shape,
+        &["shapegroup", "instance"],
+        "write the shape out at each place where it stands",
+    ),
+    (
+        Bsdf,
+        &[
+            "roughdielectric",
+            "thindielectric",
+            "plastic",
+            "roughplastic",
+            "principled",
+            "principledthin",
+            "pplastic",
+            "phong",
+            "ward",
+            "roughdiffuse",
+            "roughcoating",
+            "coating",
+            "hair",
+            "irawan",
+            "difftrans",
+            "hk",
+            "mixturebsdf",
+            "blendbsdf",
+        ],
+        NEAR_BSDF,
+    ),
+    (
+        Bsdf,
+        &["bumpmap", "normalmap", "displacement"],
+        "put the material in its place and the relief into the mesh",
+    ),
+    (Bsdf, &["mask", "null"], "cut the holes out of the mesh"),
+    (
+        Bsdf,
+        &[
+            "measured",
+            "measured_polarized",
+            "polarizer",
+            "retarder",
+            "circular",
+        ],
+        "luxel renders unpolarized RGB; use the nearest of diffuse, conductor, roughconductor and dielectric",
+    ),
+    (
+        Emitter,
+        &[
+            "spot",
+            "directional",
+            "directionalarea",
+            "projector",
+            "collimated",
+            "sun",
+            "sky",
+            "sunsky",
+            "volumelight",
+            "timed_sunsky",
+        ],
+        "use an area light, a point light or an environment map",
+    ),
+    (
+        Texture,
+        &[
+            "uniform",
+            "d65",
+            "blackbody",
+            "regular",
+            "irregular",
+            "srgb",
+            "rawconstant",
+            "discrete",
+        ],
+        RGB,
+    ),
+    (
+        Texture,
+        &[
+            "mesh_attribute",
+            "volume",
+            "vertexcolors",
+            "scale",
+            "gridtexture",
+            "wireframe",
+            "curvature",
+        ],
+        BAKE,
+    ),
+    (
+        Sensor,
+        &[
+            "thinlens",
+            "orthographic",
+            "spherical",
+            "telecentric",
+            "perspective_rdist",
+            "batch",
+        ],
+        PINHOLE,
+    ),
+    (
+        Sensor,
+        &[
+            "radiancemeter",
+            "irradiancemeter",
+            "fluencemeter",
+            "distant",
+            "mpath",
+        ],
+        PINHOLE,
+    ),
+    (
+        Film,
+        &["ldrfilm", "mfilm", "specfilm", "tiledhdrfilm", "libfilm"],
+        "use the film \"hdrfilm\"; -o with a name ending in .png writes an 8-bit image",
+    ),
+    (
+        Integrator,
+        &[
+            "ptracer",
+            "photonmapper",
+            "ppm",
+            "sppm",
+            "bdpt",
+            "mlt",
+            "pssmlt",
+            "erpt",
+            "vpl",
+            "irrcache",
+            "adaptive",
+            "depth",
+            "stokes",
+            "volpath",
+            "volpathmis",
+            "volpath_simple",
+        ],
+        METHOD,
+    ),
+    (
+        Integrator,
+        &[
+            "prb",
+            "prb_basic",
+            "prb_projective",
+            "prbvolpath",
+            "direct_projective",
+            "volprim_rf_basic",
+        ],
+        DERIVATIVE,
+    ),
+    (
+        Sampler,
+        &["halton", "hammersley"],
+        "use the sampler \"sobol\" or \"independent\"",
+    ),
+];
+
+/// What to do about a plugin that is known but not supported; `None` for a name that nobody knows.
+pub fn why_unsupported(category: Category, name: &str) -> Option<&'static str> {
+    match category {
+        Category::Medium | Category::Volume | Category::Phase => Some(SURFACES),
+        _ => TABLE
+            .iter()
+            .find(|(c, names, _)| *c == category && names.contains(&name))
+            .map(|(_, _, help)| *help),
+    }
+}
