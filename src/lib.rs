@@ -3,4 +3,5 @@
 
 pub mod bsdf;
 pub mod geom;
+pub mod image_io;
 pub mod math;
