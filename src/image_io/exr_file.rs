@@ -102,7 +102,9 @@ fn checked_headers(bytes: &[u8]) -> Result<Vec<Header>, String> {
         }
         // Each chunk has an entry of 8 bytes in a table of offsets: no table, no chunk, no memory.
         if header.chunk_count as u64 > bytes.len() as u64 / 8 {
-            return Err("the file is cut off: it has fewer chunks than its header says".to_string());
+            return Err(
+                "the file is cut off: it has fewer chunks than its header says".to_string(),
+            );
         }
     }
     Ok(meta.headers.into_iter().collect())

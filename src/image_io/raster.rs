@@ -15,6 +15,9 @@ use crate::math::Rgb;
 const JPEG_QUALITY: u8 = 95;
 
 pub(super) fn decode(bytes: &[u8], kind: Kind) -> Result<Bitmap, String> {
+    if !is_complete(bytes, kind) {
+        return Err("the file is cut off".to_string());
+    }
     guarded(|| {
         let mut reader = ImageReader::with_format(Cursor::new(bytes), format(kind)?);
         let mut limits = image::Limits::default();
@@ -50,6 +53,34 @@ pub(super) fn decode(bytes: &[u8], kind: Kind) -> Result<Bitmap, String> {
             pixels,
         })
     })
+}
+
+/// Whether the end mark of the format is there. The JPEG decoder paints what is missing grey without
+/// a word, and a PNG without its last bytes may be a copy that has not ended.
+fn is_complete(bytes: &[u8], kind: Kind) -> bool {
+    let holds = |mark: &[u8], part: &[u8]| part.windows(mark.len()).rev().any(|w| w == mark);
+    match kind {
+        Kind::Png => holds(b"IEND\xae\x42\x60\x82", bytes),
+        // After the start of a scan: a preview in the header has an end mark of its own.
+        Kind::Jpeg => jpeg_scan(bytes).is_some_and(|scan| holds(b"\xff\xd9", scan)),
+        _ => true,
+    }
+}
+
+/// What follows the first start-of-scan marker of a JPEG file (ITU-T T.81, annex B).
+fn jpeg_scan(bytes: &[u8]) -> Option<&[u8]> {
+    let mut rest = bytes.get(2..)?;
+    loop {
+        match rest {
+            [0xff, 0xff, ..] => rest = &rest[1..],
+            [0xff, 0xda, scan @ ..] => return Some(scan),
+            [0xff, _, hi, lo, ..] => {
+                let length = usize::from(u16::from_be_bytes([*hi, *lo]));
+                rest = rest.get(2 + length..)?;
+            }
+            _ => return None,
+        }
+    }
 }
 
 fn unit(raw: Vec<u16>) -> Pixels {
