@@ -5,3 +5,4 @@ pub mod bsdf;
 pub mod geom;
 pub mod image_io;
 pub mod math;
+pub mod study;

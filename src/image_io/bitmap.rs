@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::color::srgb_to_linear;
 use super::{Channel, Image, ImageError, Kind, Layer, Samples};
 use super::{exr_file, pfm, raster, read_bytes};
 
@@ -113,23 +114,5 @@ impl Bitmap {
             channels: names.iter().enumerate().map(plane).collect(),
         });
         image
-    }
-}
-
-/// The sRGB curve, IEC 61966-2-1: encoded 0..1 to linear 0..1.
-pub fn srgb_to_linear(v: f32) -> f32 {
-    if v <= 0.040_45 {
-        v / 12.92
-    } else {
-        ((v + 0.055) / 1.055).powf(2.4)
-    }
-}
-
-/// Inverse of [`srgb_to_linear`]; the argument is not clamped.
-pub fn linear_to_srgb(v: f32) -> f32 {
-    if v <= 0.003_130_8 {
-        12.92 * v
-    } else {
-        1.055 * v.powf(1.0 / 2.4) - 0.055
     }
 }

@@ -10,6 +10,7 @@
 
 mod atomic;
 mod bitmap;
+pub mod color;
 mod exr_file;
 mod pfm;
 mod raster;
@@ -20,7 +21,7 @@ use std::path::{Path, PathBuf};
 use crate::math::Rgb;
 
 pub use atomic::write_atomic;
-pub use bitmap::{Bitmap, Encoding, Pixels, linear_to_srgb, srgb_to_linear};
+pub use bitmap::{Bitmap, Encoding, Pixels};
 pub use exr_file::read_metadata;
 
 /// Largest number of pixels that a reader or writer accepts.
@@ -156,22 +157,12 @@ impl Layer {
             return Some(rgb);
         }
         if let Some(mut xyz) = triple(["X", "Y", "Z"]) {
-            xyz.iter_mut().for_each(|c| *c = xyz_to_rgb(*c));
+            xyz.iter_mut().for_each(|c| *c = color::xyz_to_rgb(*c));
             return Some(xyz);
         }
         let y = self.channel("Y")?;
         Some((0..y.len()).map(|i| Rgb::splat(y.get(i))).collect())
     }
-}
-
-/// CIE XYZ (Y = 1 for D65 white) to linear Rec. 709.
-fn xyz_to_rgb(c: Rgb) -> Rgb {
-    let [x, y, z] = c.to_array();
-    Rgb::new(
-        3.240_97 * x - 1.537_383_2 * y - 0.498_610_76 * z,
-        -0.969_243_65 * x + 1.875_967_5 * y + 0.041_555_06 * z,
-        0.055_630_08 * x - 0.203_976_96 * y + 1.056_971_5 * z,
-    )
 }
 
 /// A picture of linear numbers with layers, as EXR holds it.

@@ -7,7 +7,8 @@ use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::PngEncoder;
 use image::{ColorType, DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageReader};
 
-use super::bitmap::{Bitmap, Encoding, Pixels, linear_to_srgb};
+use super::bitmap::{Bitmap, Encoding, Pixels};
+use super::color::linear_to_srgb;
 use super::{Kind, MAX_PIXELS, Samples, check_size, guarded};
 use crate::math::Rgb;
 
