@@ -139,13 +139,13 @@ impl<I: Isa> Boxes<I> {
     #[inline(always)]
     fn test(&self, isa: I, node: &Node, limit: I::F) -> (u32, I::F) {
         let [x, y, z] = self.side;
-        // The second operand wins over a NaN; so the ends of these chains must not be one.
-        let enter = isa.max(self.slab(isa, node, z, 2), isa.splat(0.0));
-        let enter = isa.max(self.slab(isa, node, y, 1), enter);
-        let enter = isa.max(self.slab(isa, node, x, 0), enter);
-        let leave = isa.min(self.slab(isa, node, !z, 2), isa.splat(f32::INFINITY));
-        let leave = isa.min(self.slab(isa, node, !y, 1), leave);
-        let leave = isa.min(self.slab(isa, node, !x, 0), leave);
+        // Where one operand is a NaN the second wins: at worst a bound is forgotten, and `enter` is
+        // never a NaN.
+        let enter = isa.max(self.slab(isa, node, x, 0), self.slab(isa, node, y, 1));
+        let floor = isa.max(self.slab(isa, node, z, 2), isa.splat(0.0));
+        let enter = isa.max(enter, floor);
+        let leave = isa.min(self.slab(isa, node, !x, 0), self.slab(isa, node, !y, 1));
+        let leave = isa.min(leave, self.slab(isa, node, !z, 2));
         let leave = isa.min(isa.mul(leave, isa.splat(BOX_MARGIN)), limit);
         (isa.le(enter, leave), enter)
     }
@@ -207,13 +207,23 @@ pub fn trace<I: Isa, L: Leaf, const ANY: bool>(
                 continue;
             }
             let enter = isa.store(enter);
+            let a = Entry::new(current, enter.0[first]);
+            let slot = take(&mut hits);
+            wide.prefetch(isa, node.child[slot]);
+            let b = Entry::new(node.child[slot], enter.0[slot]);
+            let (near, far) = if a <= b { (a, b) } else { (b, a) };
+            if hits == 0 {
+                stack.push(far);
+                current = near.child();
+                continue;
+            }
             let base = stack.len();
-            stack.push(Entry::new(current, enter.0[first]));
+            stack.push(far);
+            stack.push(near);
             while hits != 0 {
                 let slot = take(&mut hits);
-                let child = node.child[slot];
-                wide.prefetch(isa, child);
-                stack.insert(base, Entry::new(child, enter.0[slot]));
+                wide.prefetch(isa, node.child[slot]);
+                stack.insert(base, Entry::new(node.child[slot], enter.0[slot]));
             }
             match stack.pop() {
                 Some(e) => current = e.child(),
