@@ -8,24 +8,29 @@ use crate::math::Aabb;
 use glam::{Vec3A, Vec4};
 use rayon::prelude::*;
 
-/// A primitive to build over. The number rides in the fourth lane of one corner.
+/// A primitive to build over. The halves of its number ride in the fourth lanes of the corners, as
+/// fractions of floats from 1 to 2: as plain bits they would be subnormal, and arithmetic that drags
+/// them along ten times slower.
 #[derive(Clone, Copy)]
 pub struct Prim {
     min: Vec4,
     max: Vec4,
 }
 
+const ONE: u32 = 0x3f80_0000;
+const HALF: u32 = 0xffff;
+
 impl Prim {
     /// `bounds` finite and not empty.
     pub fn new(bounds: Aabb, id: u32) -> Prim {
         Prim {
-            min: bounds.min.extend(f32::from_bits(id)),
-            max: bounds.max.extend(0.0),
+            min: bounds.min.extend(f32::from_bits(ONE | id & HALF)),
+            max: bounds.max.extend(f32::from_bits(ONE | id >> 16)),
         }
     }
 
     pub fn id(&self) -> u32 {
-        self.min.w.to_bits()
+        self.min.w.to_bits() & HALF | (self.max.w.to_bits() & HALF) << 16
     }
 
     pub fn bounds(&self) -> Aabb {
