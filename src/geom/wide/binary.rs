@@ -8,24 +8,29 @@ use crate::math::Aabb;
 use glam::{Vec3A, Vec4};
 use rayon::prelude::*;
 
-/// A primitive to build over. The number rides in the fourth lane of one corner.
+/// A primitive to build over. The halves of its number ride in the fourth lanes of the corners, as
+/// fractions of floats from 1 to 2: as plain bits they would be subnormal, and arithmetic that drags
+/// them along ten times slower.
 #[derive(Clone, Copy)]
 pub struct Prim {
     min: Vec4,
     max: Vec4,
 }
 
+const ONE: u32 = 0x3f80_0000;
+const HALF: u32 = 0xffff;
+
 impl Prim {
     /// `bounds` finite and not empty.
     pub fn new(bounds: Aabb, id: u32) -> Prim {
         Prim {
-            min: bounds.min.extend(f32::from_bits(id)),
-            max: bounds.max.extend(0.0),
+            min: bounds.min.extend(f32::from_bits(ONE | id & HALF)),
+            max: bounds.max.extend(f32::from_bits(ONE | id >> 16)),
         }
     }
 
     pub fn id(&self) -> u32 {
-        self.min.w.to_bits()
+        self.min.w.to_bits() & HALF | (self.max.w.to_bits() & HALF) << 16
     }
 
     pub fn bounds(&self) -> Aabb {
@@ -76,7 +81,10 @@ pub fn build(prims: &mut [Prim], max_depth: u32) -> Vec<BinaryNode> {
 
 /// Lists longer than this are worth a task of their own.
 const TASK: usize = 8192;
-const BINS: usize = 16;
+/// Lists up to this length are halved: they end up in one pack of triangles anyway.
+const TINY: usize = 4;
+/// Lists up to this length make do with eight bins, longer ones get sixteen.
+const SMALL: usize = 16;
 
 /// Put a tree over `prims` into `node` and its descendants into `below`, whose first has index `base`.
 fn split(
@@ -140,63 +148,67 @@ fn split(
 /// Reorder `prims` (two or more) into two parts; gives the length of the first, and the bounds of both.
 fn divide(prims: &mut [Prim], depth_left: u32) -> (usize, Aabb, Aabb) {
     let n = prims.len();
-    let halves = |prims: &mut [Prim]| {
-        let (l, r) = prims.split_at(n / 2);
-        (n / 2, union(l), union(r))
-    };
-    // Levels needed to reach single primitives by halving from here.
-    let needed = (n - 1).ilog2() + 1;
-    if n == 2 {
-        return halves(prims);
-    }
     let centers = fold(
         prims,
         || (Vec3A::INFINITY, Vec3A::NEG_INFINITY),
-        |(lo, hi), p| (lo.min(p.center()), hi.max(p.center())),
+        |(lo, hi), p| (*lo, *hi) = (lo.min(p.center()), hi.max(p.center())),
         |a, b| (a.0.min(b.0), a.1.max(b.1)),
     );
-    let grid = Grid::new(centers, n);
-    if depth_left <= needed {
-        return halve_by_center(prims, &grid);
-    }
-    let bins = fold(prims, Bins::default, |b, p| b.add(&grid, p), Bins::merge);
-    let Some(plane) = bins.best_plane(grid.count) else {
-        return halves(prims);
+    // Levels needed to reach single primitives by halving from here.
+    let needed = (n - 1).ilog2() + 1;
+    let by_cost = if n <= TINY || depth_left <= needed {
+        None
+    } else if n <= SMALL {
+        divide_by_cost::<8>(prims, centers)
+    } else {
+        divide_by_cost::<16>(prims, centers)
     };
-    let mut at = 0;
-    for i in 0..n {
-        if grid.bin(&prims[i], plane.axis) < plane.bin {
-            prims.swap(i, at);
-            at += 1;
-        }
-    }
-    (at, plane.left, plane.right)
+    by_cost.unwrap_or_else(|| {
+        let axis = (centers.1 - centers.0).max_position();
+        let key = |p: &Prim| p.center()[axis];
+        prims.select_nth_unstable_by(n / 2, |a, b| {
+            key(a).total_cmp(&key(b)).then(a.id().cmp(&b.id()))
+        });
+        let (l, r) = prims.split_at(n / 2);
+        (n / 2, union(l), union(r))
+    })
 }
 
-/// Two halves of equal number along the longest axis: for where the tree has become too deep.
-fn halve_by_center(prims: &mut [Prim], grid: &Grid) -> (usize, Aabb, Aabb) {
-    let axis = grid.longest;
-    let at = prims.len() / 2;
-    let key = |p: &Prim| p.center()[axis];
-    prims.select_nth_unstable_by(at, |a, b| {
-        key(a).total_cmp(&key(b)).then(a.id().cmp(&b.id()))
-    });
-    let (l, r) = prims.split_at(at);
-    (at, union(l), union(r))
+/// [`divide`] at the cheapest plane between bins; `None` if there is no plane.
+fn divide_by_cost<const BINS: usize>(
+    prims: &mut [Prim],
+    centers: (Vec3A, Vec3A),
+) -> Option<(usize, Aabb, Aabb)> {
+    let grid = Grid::<BINS>::new(centers);
+    let start = Bins::<BINS>::default;
+    let bins = fold(prims, start, |b, p| b.add(&grid, p), Bins::merge);
+    let plane = bins.best_plane()?;
+    // Always swapping is cheaper than a branch that is wrong every other time.
+    let mut at = 0;
+    for i in 0..prims.len() {
+        let left = grid.bins(&prims[i])[plane.axis] < plane.bin;
+        prims.swap(i, at);
+        at += usize::from(left);
+    }
+    Some((at, plane.left, plane.right))
 }
 
 /// Fold that is parallel for long lists. `merge` must be exact, so that the cuts do not matter.
 fn fold<T: Send>(
     prims: &[Prim],
     start: impl Fn() -> T + Sync,
-    add: impl Fn(T, &Prim) -> T + Sync,
+    add: impl Fn(&mut T, &Prim) + Sync,
     merge: impl Fn(T, T) -> T + Sync,
 ) -> T {
+    let part = |prims: &[Prim]| {
+        let mut sum = start();
+        prims.iter().for_each(|p| add(&mut sum, p));
+        sum
+    };
     if prims.len() <= 8 * TASK {
-        prims.iter().fold(start(), add)
+        part(prims)
     } else {
-        let parts = prims.par_chunks(TASK).map(|c| c.iter().fold(start(), &add));
-        parts.reduce(&start, &merge)
+        prims.par_chunks(TASK).map(part).reduce(&start, &merge)
     }
 }
 
@@ -204,7 +216,7 @@ fn union(prims: &[Prim]) -> Aabb {
     let all = fold(
         prims,
         || (Vec4::INFINITY, Vec4::NEG_INFINITY),
-        |(lo, hi), p| (lo.min(p.min), hi.max(p.max)),
+        |(lo, hi), p| (*lo, *hi) = (lo.min(p.min), hi.max(p.max)),
         |a, b| (a.0.min(b.0), a.1.max(b.1)),
     );
     Prim {
@@ -214,39 +226,28 @@ fn union(prims: &[Prim]) -> Aabb {
     .bounds()
 }
 
-/// Where the bins lie: `count` equal intervals of the box of the centres, on each axis.
-struct Grid {
+/// Where the bins lie: equal intervals of the box of the centres, on each axis.
+struct Grid<const BINS: usize> {
     min: Vec3A,
     scale: Vec3A,
-    count: usize,
-    longest: usize,
 }
 
-impl Grid {
-    fn new((min, max): (Vec3A, Vec3A), prims: usize) -> Grid {
-        let size = max - min;
-        let count = prims.clamp(4, BINS);
-        // An axis without extent gets scale 0: all in bin 0. So does one too short to be divided.
-        let per = Vec3A::splat(count as f32 * 0.999_99) / size;
+impl<const BINS: usize> Grid<BINS> {
+    fn new((min, max): (Vec3A, Vec3A)) -> Grid<BINS> {
+        // An axis without extent, or too short to be divided, gets scale 0: all in bin 0.
+        let per = Vec3A::splat(BINS as f32 * 0.999_99) / (max - min);
         let scale = Vec3A::select(per.is_finite_mask(), per, Vec3A::ZERO);
-        Grid {
-            min,
-            scale,
-            count,
-            longest: size.max_position(),
-        }
+        Grid { min, scale }
     }
 
-    fn bin3(&self, p: &Prim) -> [usize; 3] {
+    /// The bin on each axis.
+    fn bins(&self, p: &Prim) -> [usize; 3] {
         let at = (p.center() - self.min) * self.scale;
-        at.to_array().map(|x| (x as usize).min(BINS - 1))
-    }
-
-    fn bin(&self, p: &Prim, axis: usize) -> usize {
-        self.bin3(p)[axis]
+        at.to_array().map(|x| x as i32 as usize & (BINS - 1))
     }
 }
 
+/// What lies in a bin, or in several.
 #[derive(Clone, Copy)]
 struct Bin {
     min: Vec4,
@@ -254,13 +255,13 @@ struct Bin {
     count: u32,
 }
 
-const EMPTY_BIN: Bin = Bin {
-    min: Vec4::INFINITY,
-    max: Vec4::NEG_INFINITY,
-    count: 0,
-};
-
 impl Bin {
+    const EMPTY: Bin = Bin {
+        min: Vec4::INFINITY,
+        max: Vec4::NEG_INFINITY,
+        count: 0,
+    };
+
     fn union(self, o: &Bin) -> Bin {
         Bin {
             min: self.min.min(o.min),
@@ -283,11 +284,11 @@ impl Bin {
     }
 }
 
-struct Bins([[Bin; BINS]; 3]);
+struct Bins<const BINS: usize>([[Bin; BINS]; 3]);
 
-impl Default for Bins {
-    fn default() -> Bins {
-        Bins([[EMPTY_BIN; BINS]; 3])
+impl<const BINS: usize> Default for Bins<BINS> {
+    fn default() -> Bins<BINS> {
+        Bins([[Bin::EMPTY; BINS]; 3])
     }
 }
 
@@ -299,19 +300,18 @@ struct Plane {
     right: Aabb,
 }
 
-impl Bins {
-    fn add(mut self, grid: &Grid, p: &Prim) -> Bins {
-        let at = grid.bin3(p);
+impl<const BINS: usize> Bins<BINS> {
+    fn add(&mut self, grid: &Grid<BINS>, p: &Prim) {
+        let at = grid.bins(p);
         for (bins, at) in self.0.iter_mut().zip(at) {
             let bin = &mut bins[at];
             bin.min = bin.min.min(p.min);
             bin.max = bin.max.max(p.max);
             bin.count += 1;
         }
-        self
     }
 
-    fn merge(mut self, o: Bins) -> Bins {
+    fn merge(mut self, o: Bins<BINS>) -> Bins<BINS> {
         for (bins, others) in self.0.iter_mut().zip(&o.0) {
             for (bin, other) in bins.iter_mut().zip(others) {
                 *bin = bin.union(other);
@@ -321,35 +321,33 @@ impl Bins {
     }
 
     /// The cheapest plane with primitives on both sides.
-    fn best_plane(&self, count: usize) -> Option<Plane> {
-        let mut best: Option<Plane> = None;
-        let mut best_cost = f32::INFINITY;
+    fn best_plane(&self) -> Option<Plane> {
+        let mut best = (f32::INFINITY, 0, 0);
         for (axis, bins) in self.0.iter().enumerate() {
-            let mut right = [EMPTY_BIN; BINS];
-            let mut sum = EMPTY_BIN;
-            for bin in (1..count).rev() {
-                sum = sum.union(&bins[bin]);
-                right[bin] = sum;
-            }
-            let mut left = EMPTY_BIN;
-            for bin in 1..count {
-                left = left.union(&bins[bin - 1]);
-                if left.count == 0 || right[bin].count == 0 {
-                    continue;
+            let mut right_cost = [f32::INFINITY; BINS];
+            let mut right = Bin::EMPTY;
+            for bin in (1..BINS).rev() {
+                right = right.union(&bins[bin]);
+                if right.count > 0 {
+                    right_cost[bin] = right.cost();
                 }
-                let cost = left.cost() + right[bin].cost();
-                if cost < best_cost {
-                    best_cost = cost;
-                    let (left, right) = (left.bounds(), right[bin].bounds());
-                    best = Some(Plane {
-                        axis,
-                        bin,
-                        left,
-                        right,
-                    });
+            }
+            let mut left = Bin::EMPTY;
+            for bin in 1..BINS {
+                left = left.union(&bins[bin - 1]);
+                let cost = left.cost() + right_cost[bin];
+                if left.count > 0 && cost < best.0 {
+                    best = (cost, axis, bin);
                 }
             }
         }
-        best
+        let (cost, axis, bin) = best;
+        let all = |bins: &[Bin]| bins.iter().fold(Bin::EMPTY, Bin::union).bounds();
+        (cost < f32::INFINITY).then(|| Plane {
+            axis,
+            bin,
+            left: all(&self.0[axis][..bin]),
+            right: all(&self.0[axis][bin..]),
+        })
     }
 }

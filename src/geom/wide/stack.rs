@@ -42,7 +42,7 @@ impl Stack {
     #[inline(always)]
     pub fn new() -> Stack {
         Stack {
-            slots: [MaybeUninit::uninit(); SIZE],
+            slots: [const { MaybeUninit::uninit() }; SIZE],
             len: 0,
         }
     }

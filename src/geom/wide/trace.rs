@@ -8,7 +8,7 @@
 
 use super::isa::Isa;
 use super::stack::{Entry, Stack};
-use super::{Child, Lanes, OTHER, Pack, Wide};
+use super::{Child, Lanes, Node, OTHER, Pack, Wide};
 use crate::geom::Ray;
 use crate::math::{Vec2, fp};
 
@@ -74,6 +74,92 @@ impl Shear {
             sz: 1.0 / d[z],
         }
     }
+
+    /// One corner of eight triangles, relative to the origin and sheared.
+    #[inline(always)]
+    fn corner<I: Isa>(&self, isa: I, pack: &Pack, o: &[f32; 3], k: usize) -> [I::F; 3] {
+        let x = isa.load(&pack.corner[self.x][k]);
+        let y = isa.load(&pack.corner[self.y][k]);
+        let z = isa.load(&pack.corner[self.z][k]);
+        let z = isa.sub(z, isa.splat(o[self.z]));
+        let x = isa.sub(
+            isa.sub(x, isa.splat(o[self.x])),
+            isa.mul(isa.splat(self.sx), z),
+        );
+        let y = isa.sub(
+            isa.sub(y, isa.splat(o[self.y])),
+            isa.mul(isa.splat(self.sy), z),
+        );
+        [x, y, z]
+    }
+}
+
+/// The lowest bit of `mask` as a lane, taken out of it.
+#[inline(always)]
+fn take(mask: &mut u32) -> usize {
+    let lane = mask.trailing_zeros() as usize & 7;
+    *mask &= *mask - 1;
+    lane
+}
+
+/// The ray as the box test wants it.
+struct Boxes<I: Isa> {
+    o: [I::F; 3],
+    inv: [I::F; 3],
+    /// 1 where the direction is negative: there the upper bound is the near one.
+    side: [usize; 3],
+}
+
+impl<I: Isa> Boxes<I> {
+    #[inline(always)]
+    fn new(isa: I, ray: &Ray) -> Boxes<I> {
+        let (o, d) = (ray.o, ray.d);
+        // An inverse of infinity is right: times a non-zero offset it gives an infinity of the right
+        // sign, times zero (the origin lies in the plane) a NaN, which `test` passes over.
+        let inv = [1.0 / d.x, 1.0 / d.y, 1.0 / d.z];
+        Boxes {
+            o: [isa.splat(o.x), isa.splat(o.y), isa.splat(o.z)],
+            inv: [isa.splat(inv[0]), isa.splat(inv[1]), isa.splat(inv[2])],
+            side: [
+                usize::from(inv[0].is_sign_negative()),
+                usize::from(inv[1].is_sign_negative()),
+                usize::from(inv[2].is_sign_negative()),
+            ],
+        }
+    }
+
+    /// Where the ray crosses the plane.
+    #[inline(always)]
+    fn slab(&self, isa: I, node: &Node, upper: usize, axis: usize) -> I::F {
+        let plane = isa.load(&node.planes[upper & 1][axis]);
+        isa.mul(isa.sub(plane, self.o[axis]), self.inv[axis])
+    }
+
+    /// The children met before `limit`, and where the ray enters each.
+    #[inline(always)]
+    fn test(&self, isa: I, node: &Node, limit: I::F) -> (u32, I::F) {
+        let [x, y, z] = self.side;
+        // Where one operand is a NaN the second wins: at worst a bound is forgotten, and `enter` is
+        // never a NaN.
+        let enter = isa.max(self.slab(isa, node, x, 0), self.slab(isa, node, y, 1));
+        let floor = isa.max(self.slab(isa, node, z, 2), isa.splat(0.0));
+        let enter = isa.max(enter, floor);
+        let leave = isa.min(self.slab(isa, node, !x, 0), self.slab(isa, node, !y, 1));
+        let leave = isa.min(leave, self.slab(isa, node, !z, 2));
+        let leave = isa.min(isa.mul(leave, isa.splat(BOX_MARGIN)), limit);
+        (isa.le(enter, leave), enter)
+    }
+}
+
+/// An edge function, from two sheared corners.
+#[inline(always)]
+fn edge<I: Isa>(isa: I, p: &[I::F; 3], q: &[I::F; 3]) -> I::F {
+    isa.sub(isa.mul(p[0], q[1]), isa.mul(p[1], q[0]))
+}
+
+#[inline(always)]
+fn stored<I: Isa>(isa: I, [x, y, z]: [I::F; 3]) -> [Lanes<f32>; 3] {
+    [isa.store(x), isa.store(y), isa.store(z)]
 }
 
 /// Traverse. With `ANY` the first meeting found ends the search.
@@ -87,14 +173,8 @@ pub fn trace<I: Isa, L: Leaf, const ANY: bool>(
     if wide.root == Child::EMPTY {
         return None;
     }
-    let (o, d) = (ray.o.to_array(), ray.d.to_array());
-    // An inverse of infinity is right: times a plain non-zero offset it gives an infinity of the right
-    // sign, times zero (the origin lies in the plane) a NaN, which `max` and `min` below pass over.
-    let inv = d.map(|d| 1.0 / d);
-    let side = inv.map(|i| usize::from(i.is_sign_negative()));
-    let (ov, iv) = (o.map(|x| isa.splat(x)), inv.map(|x| isa.splat(x)));
-    let zero = isa.splat(0.0);
-    let margin = isa.splat(BOX_MARGIN);
+    let o = ray.o.to_array();
+    let boxes = Boxes::new(isa, ray);
     let shear = Shear::new(ray);
 
     let mut search = Search {
@@ -109,55 +189,41 @@ pub fn trace<I: Isa, L: Leaf, const ANY: bool>(
     loop {
         while !current.is_leaf() {
             let node = &wide.nodes[current.0 as usize];
-            let near = |a: usize| isa.load(&node.planes[side[a] & 1][a]);
-            let far = |a: usize| isa.load(&node.planes[!side[a] & 1][a]);
-            let slab = |plane: I::F, a: usize| isa.mul(isa.sub(plane, ov[a]), iv[a]);
-            // The second operand wins over a NaN, so the ends of the chain must not be one.
-            let enter = isa.max(slab(near(1), 1), isa.max(slab(near(2), 2), zero));
-            let enter = isa.max(slab(near(0), 0), enter);
-            let leave = isa.min(
-                slab(far(1), 1),
-                isa.min(slab(far(2), 2), isa.splat(f32::MAX)),
-            );
-            let leave = isa.min(slab(far(0), 0), leave);
-            let leave = isa.min(isa.mul(leave, margin), limit_v);
-            let mut hits = isa.le(enter, leave);
+            let (mut hits, enter) = boxes.test(isa, node, limit_v);
             if hits == 0 {
                 current = Child::EMPTY;
                 break;
             }
-            let mut next = || {
-                let slot = hits.trailing_zeros() as usize & 7;
-                hits &= hits - 1;
-                (slot, hits != 0)
-            };
-            let (first, more) = next();
+            let first = take(&mut hits);
             current = node.child[first];
             wide.prefetch(isa, current);
-            if !more {
+            if hits == 0 {
                 continue;
             }
             if ANY {
-                loop {
-                    let (slot, more) = next();
-                    stack.push(Entry::new(node.child[slot], 0.0));
-                    if !more {
-                        break;
-                    }
+                while hits != 0 {
+                    stack.push(Entry::new(node.child[take(&mut hits)], 0.0));
                 }
                 continue;
             }
             let enter = isa.store(enter);
+            let a = Entry::new(current, enter.0[first]);
+            let slot = take(&mut hits);
+            wide.prefetch(isa, node.child[slot]);
+            let b = Entry::new(node.child[slot], enter.0[slot]);
+            let (near, far) = if a <= b { (a, b) } else { (b, a) };
+            if hits == 0 {
+                stack.push(far);
+                current = near.child();
+                continue;
+            }
             let base = stack.len();
-            stack.push(Entry::new(current, enter.0[first]));
-            loop {
-                let (slot, more) = next();
-                let child = node.child[slot];
-                wide.prefetch(isa, child);
-                stack.insert(base, Entry::new(child, enter.0[slot]));
-                if !more {
-                    break;
-                }
+            stack.push(far);
+            stack.push(near);
+            while hits != 0 {
+                let slot = take(&mut hits);
+                wide.prefetch(isa, node.child[slot]);
+                stack.insert(base, Entry::new(node.child[slot], enter.0[slot]));
             }
             match stack.pop() {
                 Some(e) => current = e.child(),
@@ -247,16 +313,14 @@ impl Search {
         s: &Shear,
         leaf: &L,
     ) -> bool {
-        let (cx, cy, cz) = (&pack.corner[s.x], &pack.corner[s.y], &pack.corner[s.z]);
-        let (ox, oy, oz) = (isa.splat(o[s.x]), isa.splat(o[s.y]), isa.splat(o[s.z]));
-        let (sx, sy) = (isa.splat(s.sx), isa.splat(s.sy));
-        // Corners relative to the origin, sheared.
-        let z = [0, 1, 2].map(|k| isa.sub(isa.load(&cz[k]), oz));
-        let x = [0, 1, 2].map(|k| isa.sub(isa.sub(isa.load(&cx[k]), ox), isa.mul(sx, z[k])));
-        let y = [0, 1, 2].map(|k| isa.sub(isa.sub(isa.load(&cy[k]), oy), isa.mul(sy, z[k])));
-        // Twice the areas of the triangles that the ray spans with each edge: the edge functions.
-        let edge = |a: usize, b: usize| isa.sub(isa.mul(x[a], y[b]), isa.mul(y[a], x[b]));
-        let (u, v, w) = (edge(2, 1), edge(0, 2), edge(1, 0));
+        // Corners relative to the origin, sheared, each of the three as x, y, z.
+        let a = s.corner(isa, pack, o, 0);
+        let b = s.corner(isa, pack, o, 1);
+        let c = s.corner(isa, pack, o, 2);
+        // Twice the areas that the ray spans with each edge: the edge functions.
+        let u = edge(isa, &c, &b);
+        let v = edge(isa, &a, &c);
+        let w = edge(isa, &b, &a);
         let zero = isa.splat(0.0);
         let least = isa.min(isa.min(u, v), w);
         let most = isa.max(isa.max(u, v), w);
@@ -268,8 +332,8 @@ impl Search {
 
         let det = isa.add(isa.add(u, v), w);
         let depth = isa.add(
-            isa.add(isa.mul(u, z[0]), isa.mul(v, z[1])),
-            isa.mul(w, z[2]),
+            isa.add(isa.mul(u, a[2]), isa.mul(v, b[2])),
+            isa.mul(w, c[2]),
         );
         let t = isa.div(isa.mul(isa.splat(s.sz), depth), det);
         let mut hits = isa.lt(zero, t) & isa.lt(t, isa.splat(self.best)) & inside & !exact;
@@ -277,8 +341,7 @@ impl Search {
         if hits != 0 {
             let (t, v, w, det) = (isa.store(t), isa.store(v), isa.store(w), isa.store(det));
             while hits != 0 {
-                let i = hits.trailing_zeros() as usize & 7;
-                hits &= hits - 1;
+                let i = take(&mut hits);
                 if t.0[i] < self.best {
                     let uv = Vec2::new(v.0[i] / det.0[i], w.0[i] / det.0[i]);
                     if !L::FILTERS || leaf.accept(pack.id[i], uv) {
@@ -289,7 +352,7 @@ impl Search {
             }
         }
         if exact != 0 {
-            let lanes = [x, y, z].map(|axis| axis.map(|v| isa.store(v)));
+            let lanes = [stored(isa, a), stored(isa, b), stored(isa, c)];
             hit |= self.exact(exact, &lanes, pack, s.sz, leaf);
         }
         hit
@@ -311,19 +374,18 @@ impl Search {
     ) -> bool {
         let mut hit = false;
         while lanes != 0 {
-            let i = lanes.trailing_zeros() as usize & 7;
-            lanes &= lanes - 1;
-            let [x, y, z] = corners
+            let i = take(&mut lanes);
+            let [a, b, c] = corners
                 .each_ref()
-                .map(|a| [0, 1, 2].map(|k| f64::from(a[k].0[i])));
-            let edge = |a: usize, b: usize| x[a] * y[b] - y[a] * x[b];
-            let (u, v, w) = (edge(2, 1), edge(0, 2), edge(1, 0));
+                .map(|p| p.each_ref().map(|x| f64::from(x.0[i])));
+            let edge = |p: [f64; 3], q: [f64; 3]| p[0] * q[1] - p[1] * q[0];
+            let (u, v, w) = (edge(c, b), edge(a, c), edge(b, a));
             let det = u + v + w;
             let mixed = u.min(v).min(w) < 0.0 && u.max(v).max(w) > 0.0;
             if mixed || det == 0.0 {
                 continue;
             }
-            let t = (f64::from(sz) * (u * z[0] + v * z[1] + w * z[2]) / det) as f32;
+            let t = (f64::from(sz) * (u * a[2] + v * b[2] + w * c[2]) / det) as f32;
             let uv = Vec2::new((v / det) as f32, (w / det) as f32);
             if t > 0.0 && t < self.best && (!L::FILTERS || leaf.accept(pack.id[i], uv)) {
                 self.keep(t, pack.id[i], uv);
