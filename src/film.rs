@@ -77,6 +77,10 @@ pub struct Tile {
 }
 
 impl Tile {
+    pub fn replicates(&self) -> u32 {
+        self.replicates
+    }
+
     fn pixel(&mut self, x: u32, y: u32) -> PixelSums<'_> {
         let i = (y * self.width + x) as usize;
         let (r, a) = (self.replicates as usize, self.aov_channels);

@@ -2,11 +2,17 @@
 #![deny(unsafe_code)]
 
 pub mod bsdf;
+pub mod cli;
 pub mod film;
 pub mod format;
 pub mod geom;
 pub mod image_io;
 pub mod light;
+pub mod material;
 pub mod math;
+pub mod render;
 pub mod sampler;
+pub mod scene;
 pub mod study;
+pub mod texture;
+pub mod transport;

@@ -6,6 +6,7 @@ use std::sync::{Arc, LazyLock};
 
 use glam::Affine2;
 
+use crate::image_io::color::srgb_to_linear;
 use crate::math::{Rgb, Vec2};
 
 /// A colour as a function of the surface parameters.
@@ -96,6 +97,11 @@ impl Picture {
         }
     }
 
+    /// All texels, row by row from the top left, linear.
+    pub fn colors(&self) -> Vec<Rgb> {
+        (0..self.height).flat_map(|y| (0..self.width).map(move |x| self.texel(x, y))).collect()
+    }
+
     fn single_color(&self) -> Option<Rgb> {
         let same = match &self.texels {
             Texels::Floats(data) => data.windows(2).all(|w| w[0] == w[1]),
@@ -108,16 +114,7 @@ impl Picture {
 static BYTE_TO_UNIT: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|i| (i as f64 / 255.0) as f32));
 static SRGB_TO_LINEAR: LazyLock<[f32; 256]> =
-    LazyLock::new(|| std::array::from_fn(|i| srgb_to_linear(i as f64 / 255.0) as f32));
-
-/// Decodes a value of the sRGB transfer curve (IEC 61966-2-1).
-pub fn srgb_to_linear(v: f64) -> f64 {
-    if v <= 0.04045 {
-        v / 12.92
-    } else {
-        ((v + 0.055) / 1.055).powf(2.4)
-    }
-}
+    LazyLock::new(|| std::array::from_fn(|i| srgb_to_linear(i as f32 / 255.0)));
 
 #[derive(Clone, Debug)]
 pub struct Bitmap {

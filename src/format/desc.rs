@@ -128,6 +128,30 @@ impl SceneDesc {
         self.sources.iter().map(|s| s.name.as_path())
     }
 
+    /// Hash of everything the description says, after substitution, as 16 hexadecimal digits. The
+    /// contents of mesh and image files are not in it, only their names.
+    pub fn hash(&self) -> String {
+        // FNV-1a: stable over versions and platforms, which the standard hasher does not promise.
+        let mut hash: u64 = 0xcbf2_9ce4_8422_2325;
+        let mut add = |text: &str| {
+            for byte in text.bytes().chain([0]) {
+                hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+            }
+        };
+        for object in &self.objects {
+            add(object.plugin.name);
+            for p in &object.params {
+                add(&p.name);
+                add(&format!("{:?}", p.value));
+            }
+            for c in &object.children {
+                add(c.name.as_deref().unwrap_or_default());
+                add(&c.object.0.to_string());
+            }
+        }
+        format!("{hash:016x}")
+    }
+
     pub(super) fn place(&self, at: Span) -> Place {
         place(&self.sources, at)
     }

@@ -1,10 +1,11 @@
 //! The scene language: from an XML file to a checked [`SceneDesc`], and readers of mesh files.
 //!
 //! The language is that of Mitsuba 3. What comes out knows files and lines and nothing of rendering;
-//! building a scene from it is left to `compile`.
+//! building a scene from it is the work of [`compile`].
 
 mod check;
 mod cie;
+pub mod compile;
 mod desc;
 mod error;
 mod limits;
@@ -14,6 +15,7 @@ mod props;
 pub mod spectrum;
 mod xml;
 
+pub use compile::{Compiled, Overrides, compile};
 pub use desc::{ObjectId, SceneDesc};
 pub use error::{Place, SceneError, did_you_mean, list};
 pub use plugins::Category;
@@ -28,6 +30,16 @@ pub fn load(path: &Path, defines: &[(String, String)]) -> Result<SceneDesc, Scen
     let text = xml::read_text(path).map_err(|what| SceneError::new(whole_file(path), what))?;
     let folder = path.parent().unwrap_or(Path::new(""));
     load_source(path, text, folder, defines)
+}
+
+/// The scene that is rendered when none is named.
+const BUILT_IN: &str = include_str!("../../scenes/cornell-balls.xml");
+/// Its file name without extension.
+pub const BUILT_IN_NAME: &str = "cornell-balls";
+
+/// Reads the scene that is built into the program.
+pub fn load_built_in(defines: &[(String, String)]) -> Result<SceneDesc, SceneError> {
+    load_str("cornell-balls.xml", BUILT_IN, Path::new(""), defines)
 }
 
 /// Reads a scene from text. Errors call it `name`; files are looked for in `base_dir`.

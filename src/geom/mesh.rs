@@ -108,6 +108,14 @@ impl Mesh {
         })
     }
 
+    /// Memory that the arrays take.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.positions[..])
+            + size_of_val(&self.normals[..])
+            + size_of_val(&self.uvs[..])
+            + size_of_val(&self.indices[..])
+    }
+
     pub fn positions(&self) -> &[Vec3] {
         &self.positions
     }

@@ -53,6 +53,30 @@ fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
     done
 }
 
+/// Whether [`write_atomic`] to `path` can be expected to work, found out by writing nothing that stays:
+/// better before a long rendering than after it.
+///
+/// # Errors
+/// As [`write_atomic`].
+pub fn check_writable(path: &Path) -> Result<(), ImageError> {
+    let check = || -> io::Result<()> {
+        match fs::metadata(path) {
+            Ok(m) if m.is_dir() => Err(ErrorKind::IsADirectory.into()),
+            Ok(m) if !m.is_file() => Ok(()),
+            Ok(m) if m.permissions().readonly() => Err(io::Error::new(
+                ErrorKind::PermissionDenied,
+                "the file is marked read-only",
+            )),
+            _ => {
+                let (temporary, file) = create_beside(path)?;
+                drop(file);
+                fs::remove_file(temporary)
+            }
+        }
+    };
+    check().map_err(|e| ImageError::write(path, reason(&e)))
+}
+
 /// A new file in the folder of `target`, under a name that no other writer uses. The name does not
 /// contain the target's, which may already be as long as the file system allows.
 fn create_beside(target: &Path) -> io::Result<(PathBuf, fs::File)> {

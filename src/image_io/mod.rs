@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 
 use crate::math::Rgb;
 
-pub use atomic::write_atomic;
+pub use atomic::{check_writable, write_atomic};
 pub use bitmap::{Bitmap, Encoding, Pixels};
 pub use exr_file::read_metadata;
 
@@ -237,14 +237,16 @@ impl Image {
     /// The file appears at once and complete ([`write_atomic`]).
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), ImageError> {
         let path = path.as_ref();
-        let kind = Kind::from_extension(path)
-            .filter(|k| *k != Kind::Bmp && *k != Kind::Tga)
-            .ok_or_else(|| {
-                ImageError::write(path, "the extension is not .exr, .png, .jpg, .hdr or .pfm")
-            })?;
+        let kind = Kind::of_target(path)?;
         self.encode(kind)
             .map_err(|e| ImageError::write(path, e))
             .and_then(|bytes| write_atomic(path, &bytes))
+    }
+
+    /// Whether [`Image::write`] to `path` can be expected to work ([`check_writable`]).
+    pub fn check_target(path: impl AsRef<Path>) -> Result<(), ImageError> {
+        let path = path.as_ref();
+        Kind::of_target(path).and_then(|_| check_writable(path))
     }
 
     fn encode(&self, kind: Kind) -> Result<Vec<u8>, String> {
@@ -290,6 +292,14 @@ enum Kind {
 }
 
 impl Kind {
+    /// The kind to write, by the extension.
+    fn of_target(path: &Path) -> Result<Kind, ImageError> {
+        let kind = Kind::from_extension(path).filter(|k| *k != Kind::Bmp && *k != Kind::Tga);
+        kind.ok_or_else(|| {
+            ImageError::write(path, "the extension is not .exr, .png, .jpg, .hdr or .pfm")
+        })
+    }
+
     fn from_extension(path: &Path) -> Option<Kind> {
         let extension = path.extension()?.to_str()?.to_ascii_lowercase();
         Some(match extension.as_str() {

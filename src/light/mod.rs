@@ -229,6 +229,29 @@ impl Lights {
         self.items.len() + self.infinite.len()
     }
 
+    /// What is done to choose among the lights, and why.
+    pub fn choice(&self) -> (String, String) {
+        let local = match &self.choice {
+            _ if self.items.is_empty() => "no choice".to_string(),
+            Choice::One => "no choice".to_string(),
+            Choice::Power(_) => "by power".to_string(),
+            Choice::Tree(_) => "by a light tree".to_string(),
+        };
+        let sky = match self.infinite.len() {
+            0 => "",
+            _ => ", the environment as often as all others together",
+        };
+        let count = match self.items.len() {
+            1 => "there is 1 light at finite distance".to_string(),
+            n => format!("there are {n} lights at finite distance"),
+        };
+        (if self.items.is_empty() { local } else { local + sky }, count)
+    }
+
+    pub fn is_emitter(&self, shape: ShapeId) -> bool {
+        matches!(self.surfaces.get(shape.0 as usize), Some(Some(_)))
+    }
+
     /// Radiance that the surface sends from `hit` towards `hit.wo`.
     #[inline]
     pub fn le(&self, hit: &Hit) -> Rgb {

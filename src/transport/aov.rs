@@ -22,6 +22,8 @@ pub enum Aov {
     ShapeIndex,
     /// Number of the triangle within its mesh.
     PrimIndex,
+    /// 1 where the ray meets something that is seen, 0 where it meets nothing.
+    Alpha,
     /// Square of the sample's radiance: with the mean, the variance of a single sample.
     SecondMoment,
 }
@@ -33,6 +35,7 @@ impl Aov {
             Aov::Albedo | Aov::SecondMoment => &["R", "G", "B"],
             Aov::ShadingNormal | Aov::GeometricNormal | Aov::Position => &["X", "Y", "Z"],
             Aov::Uv => &["U", "V"],
+            Aov::Alpha => &["A"],
             Aov::Depth | Aov::ShapeIndex | Aov::PrimIndex => &["Y"],
         }
     }
@@ -47,6 +50,10 @@ pub fn evaluate(scene: &Scene, ray: &Ray, radiance: Rgb, aovs: &[Aov], out: &mut
         let start = out.len();
         match (aov, &hit) {
             (Aov::SecondMoment, _) => out.extend(radiance.map(|v| v * v).to_array()),
+            (Aov::Alpha, _) => {
+                let seen = hit.is_some() || !scene.le_escaped(ray.d).is_black();
+                out.push(f32::from(seen));
+            }
             (_, None) => out.resize(start + aov.channels().len(), 0.0),
             (Aov::Albedo, Some(h)) => out.extend(scene.bsdf(h).albedo(h.frame.to_local(h.wo)).to_array()),
             (Aov::ShadingNormal, Some(h)) => out.extend(h.frame.n.to_array()),

@@ -7,7 +7,7 @@ mod path;
 
 pub use path::{DirectSpec, PathSpec};
 
-use crate::bsdf::{Bsdf, Density};
+use crate::bsdf::{Bsdf, Mode};
 use crate::geom::{Hit, Ray};
 use crate::math::{Rgb, Vec2};
 use crate::sampler::{Sampler, dim};
@@ -90,22 +90,19 @@ pub fn direct_light(
         return Rgb::BLACK;
     };
     let (wo, wi) = (hit.frame.to_local(hit.wo), hit.frame.to_local(light.wi));
-    let (f, bsdf_pdf) = bsdf.eval_pdf(wo, wi);
+    let (f, bsdf_pdf) = bsdf.eval_pdf(wo, wi, Mode::Radiance);
     if f.is_black() {
         return Rgb::BLACK;
     }
     stats.shadow += 1;
-    if scene.occluded(&light.connection(hit)) {
+    if scene.occluded(&light.shadow_ray(hit)) {
         return Rgb::BLACK;
     }
-    let (weight, density) = match (light.density, mis) {
-        (Density::Delta, _) => (1.0, 1.0),
-        (Density::PerSr(pdf), Mis::LightOnly) => (1.0, pdf),
-        (Density::PerSr(pdf), Mis::Power { bsdf_per_light }) => {
-            (light.density.mis_weight(bsdf_pdf * bsdf_per_light), pdf)
-        }
+    let weight = match mis {
+        Mis::LightOnly => 1.0,
+        Mis::Power { bsdf_per_light } => light.density.mis_weight(bsdf_pdf * bsdf_per_light),
     };
-    f * light.le * (wi.z.abs() * weight / density)
+    f * light.weight() * (wi.z.abs() * weight)
 }
 
 /// The numbers of decision `which` (see [`dim`]) at path vertex `vertex`.

@@ -1,6 +1,6 @@
 //! The camera walk: unidirectional path tracing with next-event estimation.
 
-use crate::bsdf::Density;
+use crate::bsdf::{Density, Mode};
 use crate::geom::{Hit, Ray};
 use crate::math::{Rgb, Vec2};
 use crate::sampler::{Sampler, dim};
@@ -69,6 +69,21 @@ fn emission(scene: &Scene, ray: &Ray, met: Option<&Hit>, departure: Option<Depar
     }
 }
 
+/// The first surface that the camera sees along `ray`. Hidden emitters are not there for the camera: it
+/// sees through them.
+#[inline]
+fn first_seen(scene: &Scene, mut ray: Ray, hide_emitters: bool, stats: &mut PathStats) -> Option<Hit> {
+    loop {
+        stats.camera += 1;
+        let hit = scene.intersect(&ray)?;
+        if !(hide_emitters && scene.is_emitter(hit.shape)) {
+            return Some(hit);
+        }
+        let t_max = ray.t_max - hit.p.distance(ray.o);
+        ray = Ray { t_max, ..hit.spawn(ray.d) };
+    }
+}
+
 impl PathSpec {
     /// One sample of the radiance along `ray` (Kajiya 1986; MIS as Veach 1997, section 10.3.1).
     pub fn li(&self, scene: &Scene, mut ray: Ray, sampler: &Sampler, stats: &mut PathStats) -> Rgb {
@@ -78,9 +93,11 @@ impl PathSpec {
         // dense medium out of the roulette's decision.
         let mut eta2 = 1.0;
         let mut last: Option<(Hit, Density)> = None;
-        stats.camera += 1;
         for depth in 0..max_depth {
-            let met = scene.intersect(&ray);
+            let met = match depth {
+                0 => first_seen(scene, ray, self.hide_emitters, stats),
+                _ => scene.intersect(&ray),
+            };
             let departure =
                 last.as_ref().map(|(from, density)| Departure { from, density: *density, light_per_bsdf: 1.0 });
             if depth > 0 || !self.hide_emitters {
@@ -102,8 +119,9 @@ impl PathSpec {
             if depth + 2 >= max_depth && !scene.emitters_can_be_met() {
                 break;
             }
+            let wo = hit.frame.to_local(hit.wo);
             let [u, v, u_lobe, u_roulette] = numbers_at(sampler, depth, dim::BSDF);
-            let Some(sample) = bsdf.sample(hit.frame.to_local(hit.wo), u_lobe, Vec2::new(u, v)) else {
+            let Some(sample) = bsdf.sample(wo, u_lobe, Vec2::new(u, v), Mode::Radiance) else {
                 break;
             };
             throughput *= sample.weight;
@@ -129,8 +147,7 @@ impl PathSpec {
 impl DirectSpec {
     /// One sample of the emission seen and of the direct light reflected along `ray`.
     pub fn li(&self, scene: &Scene, ray: Ray, sampler: &Sampler, stats: &mut PathStats) -> Rgb {
-        stats.camera += 1;
-        let met = scene.intersect(&ray);
+        let met = first_seen(scene, ray, self.hide_emitters, stats);
         let mut lo = Rgb::BLACK;
         if !self.hide_emitters {
             lo += emission(scene, &ray, met.as_ref(), None);
@@ -156,7 +173,7 @@ impl DirectSpec {
         let wo = hit.frame.to_local(hit.wo);
         for i in 0..self.bsdf_samples {
             let [u, v, u_lobe, _] = numbers_at(sampler, i, dim::BSDF);
-            let Some(sample) = bsdf.sample(wo, u_lobe, Vec2::new(u, v)) else {
+            let Some(sample) = bsdf.sample(wo, u_lobe, Vec2::new(u, v), Mode::Radiance) else {
                 continue;
             };
             let ray = hit.spawn(hit.frame.to_world(sample.wi));

@@ -1,0 +1,98 @@
+//! What the user sees while a picture is rendered.
+
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::film::Film;
+use crate::render::{Stats, Stop, percent};
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum ProgressMode {
+    /// A bar on a terminal, plain lines elsewhere
+    Auto,
+    /// Nothing
+    Never,
+}
+
+/// Shows the progress of one rendering on stderr.
+pub enum Progress {
+    Off,
+    Bar(ProgressBar),
+    Lines { last: Instant },
+}
+
+/// Time between two plain lines.
+const LINE_EVERY: Duration = Duration::from_secs(10);
+/// Steps of the bar.
+const STEPS: u64 = 1000;
+
+impl Progress {
+    pub fn new(mode: ProgressMode) -> Progress {
+        match mode {
+            ProgressMode::Never => Progress::Off,
+            ProgressMode::Auto if std::io::stderr().is_terminal() => {
+                let bar = ProgressBar::new(STEPS);
+                let style = ProgressStyle::with_template("{bar:30} {percent:>3} %  {msg}");
+                bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+                Progress::Bar(bar)
+            }
+            ProgressMode::Auto => Progress::Lines { last: Instant::now() },
+        }
+    }
+
+    pub fn update(&mut self, film: &Film, stats: &Stats, stop: Stop) {
+        match self {
+            Progress::Off => {}
+            Progress::Bar(bar) => {
+                bar.set_position((done(film, stats, stop) * STEPS as f64) as u64);
+                bar.set_message(message(film, stats, stop));
+            }
+            Progress::Lines { last } => {
+                if last.elapsed() >= LINE_EVERY {
+                    *last = Instant::now();
+                    let share = 100.0 * done(film, stats, stop);
+                    eprintln!("{share:.0} %  {}", message(film, stats, stop));
+                }
+            }
+        }
+    }
+
+    pub fn finish(&self) {
+        if let Progress::Bar(bar) = self {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+/// Share of the work that is done, 0 to 1.
+fn done(film: &Film, stats: &Stats, stop: Stop) -> f64 {
+    match stop {
+        Stop::Spp(n) => film.spp() as f64 / n.max(1) as f64,
+        Stop::Time(limit) => (stats.seconds / limit.as_secs_f64().max(1e-9)).min(1.0),
+    }
+}
+
+fn message(film: &Film, stats: &Stats, stop: Stop) -> String {
+    let left = stats.seconds * (1.0 / done(film, stats, stop).max(1e-6) - 1.0);
+    let error = match film.estimate_error() {
+        Some(e) => format!("error {:.2} %", percent(&e)[0]),
+        None => "error unknown yet".to_string(),
+    };
+    format!(
+        "{} spp  {:.2} Mrays/s  {error}  {} left",
+        film.spp(),
+        stats.rays_per_second() / 1e6,
+        human_seconds(left)
+    )
+}
+
+/// `3.2 s`, `2 min 5 s`, `1 h 12 min`.
+pub fn human_seconds(s: f64) -> String {
+    match s {
+        s if s < 60.0 => format!("{s:.1} s"),
+        s if s < 3600.0 => format!("{} min {} s", (s / 60.0) as u64, (s % 60.0) as u64),
+        s => format!("{} h {} min", (s / 3600.0) as u64, (s % 3600.0 / 60.0) as u64),
+    }
+}

@@ -1,0 +1,112 @@
+//! From the description of a scene to a job that can be rendered: every default settled, every name
+//! turned into an index, the plan made.
+
+mod film;
+mod integrator;
+mod lights;
+mod materials;
+mod shapes;
+
+use rayon::prelude::*;
+
+use super::plugins::Category;
+use super::{Props, SceneDesc, SceneError, did_you_mean, list};
+use crate::film::Window;
+use crate::render::{AovLayer, Job};
+use crate::scene::{Plan, Scene};
+use crate::transport::aov::Aov;
+use materials::Materials;
+
+/// What the command line asks for in place of what the scene says.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Overrides {
+    /// Name of an integrator.
+    pub integrator: Option<String>,
+    /// Name of a sampler.
+    pub sampler: Option<String>,
+    /// Longest path in edges; -1 sets no limit.
+    pub max_depth: Option<i64>,
+    /// Width and height of the full picture in pixels.
+    pub resolution: Option<[u32; 2]>,
+    pub crop: Option<Window>,
+    /// Layers beside the colours: `albedo`, `normal`, `depth`, `position`, `uv`, `shape_id`.
+    pub aovs: Vec<String>,
+    pub seed: Option<u64>,
+}
+
+/// A scene ready to render.
+#[derive(Debug)]
+pub struct Compiled {
+    pub job: Job,
+    /// Samples per pixel that the scene asks for.
+    pub spp: u64,
+    /// What the user should know although it is no error.
+    pub warnings: Vec<String>,
+    /// Hash of the description after substitution, hexadecimal.
+    pub hash: String,
+}
+
+/// Makes a job of a description. Mesh and image files are read here.
+///
+/// # Errors
+/// A missing sensor, files that cannot be read, values that contradict each other, overrides that do
+/// not exist, and parameters that have no effect where they stand.
+pub fn compile(desc: &SceneDesc, overrides: &Overrides) -> Result<Compiled, SceneError> {
+    let root = desc.scene();
+    let mut plan = Plan::default();
+    let mut warnings = Vec::new();
+    let sensor = the_sensor(&root, &mut warnings)?;
+    let film = film::film(&sensor, overrides)?;
+    let sampler = film::sampler(&sensor, overrides, &mut plan)?;
+    let (integrator, mut aovs) = integrator::integrator(&root, overrides)?;
+    if film.pixel_format.has_alpha() {
+        aovs.push(AovLayer { name: "A".to_string(), aov: Aov::Alpha });
+    }
+
+    let shape_props = root.children(Category::Shape);
+    let sources: Result<Vec<_>, SceneError> = shape_props.par_iter().map(shapes::read).collect();
+    let (shapes, center) = shapes::place(sources?, &mut plan)?;
+    let mut materials = Materials::new(desc);
+    let mut surfaces = Vec::with_capacity(shape_props.len());
+    for props in &shape_props {
+        surfaces.push(materials.of_shape(props)?);
+    }
+    let lights = lights::lights(&root, &shape_props, &mut materials, center)?;
+    if lights.is_empty() {
+        warnings.push("the scene has no emitter, so the picture is black".to_string());
+    }
+    let camera = film::camera(&sensor, &film.spec, center)?;
+    let materials = materials.finish(&mut plan);
+    desc.check_all_read()?;
+    Ok(Compiled {
+        job: Job {
+            scene: Scene::new(shapes, surfaces, materials, lights, center, plan),
+            camera,
+            film: film.spec,
+            sampler: sampler.kind,
+            seed: overrides.seed.unwrap_or(sampler.seed),
+            integrator,
+            aovs,
+            pixel_format: film.pixel_format,
+            component_format: film.component_format,
+        },
+        spp: sampler.spp,
+        warnings,
+        hash: desc.hash(),
+    })
+}
+
+/// A help line for a name that is not among `names`: the nearest one, or all of them.
+fn suggest<'a>(found: &str, names: impl IntoIterator<Item = &'a str> + Clone) -> String {
+    did_you_mean(found, names.clone()).unwrap_or_else(|| format!("there are {}", list(names)))
+}
+
+fn the_sensor<'a>(root: &Props<'a>, warnings: &mut Vec<String>) -> Result<Props<'a>, SceneError> {
+    let sensors = root.children(Category::Sensor);
+    if sensors.len() > 1 {
+        warnings.push(format!("the scene has {} sensors: the first one is rendered", sensors.len()));
+    }
+    sensors.into_iter().next().ok_or_else(|| {
+        root.error("the scene has no sensor").with_help("add <sensor type=\"perspective\"> to say where to look from")
+    })
+}

@@ -1,0 +1,60 @@
+//! Renders small scenes given as XML text.
+#![allow(dead_code)]
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use luxel::film::Film;
+use luxel::format::{self, Compiled, Overrides};
+use luxel::render::{Stats, Stop};
+
+pub fn compile(xml: &str) -> Compiled {
+    compile_with(xml, &Overrides::default())
+}
+
+pub fn compile_with(xml: &str, overrides: &Overrides) -> Compiled {
+    let desc = format::load_str("test.xml", xml, Path::new("."), &[]).unwrap_or_else(|e| panic!("{e}"));
+    format::compile(&desc, overrides).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// `spp` samples per pixel; fails when any of them was not a finite, positive number.
+pub fn render(compiled: &Compiled, spp: u64) -> (Film, Stats) {
+    let (film, stats) = compiled.job.render(Stop::Spp(spp), |_, _| ControlFlow::Continue(()));
+    assert_eq!(stats.invalid.count, 0, "{:?}", stats.invalid);
+    (film, stats)
+}
+
+/// The mean picture of `xml` at `spp` samples per pixel, random numbers from `seed`.
+pub fn picture(xml: &str, spp: u64, seed: u64) -> Vec<[f64; 3]> {
+    let overrides = Overrides { seed: Some(seed), ..Overrides::default() };
+    render(&compile_with(xml, &overrides), spp).0.mean()
+}
+
+/// A camera at (0, 0, 4) that looks down -z, `size` pixels square, box filter.
+pub fn camera(size: u32, fov: f64) -> String {
+    format!(
+        r#"<sensor type="perspective">
+            <float name="fov" value="{fov}"/>
+            <transform name="to_world"><lookat origin="0, 0, 4" target="0, 0, 0" up="0, 1, 0"/></transform>
+            <film type="hdrfilm">
+                <integer name="width" value="{size}"/><integer name="height" value="{size}"/>
+                <rfilter type="box"/>
+            </film>
+        </sensor>"#
+    )
+}
+
+/// A scene of the path tracer from its parts.
+pub fn scene(max_depth: i32, camera: &str, content: &str) -> String {
+    format!(
+        r#"<scene version="3.0.0">
+            <integrator type="path"><integer name="max_depth" value="{max_depth}"/></integrator>
+            {camera} {content}
+        </scene>"#
+    )
+}
+
+/// Mean over all pixels of channel 0.
+pub fn mean_of(picture: &[[f64; 3]]) -> f64 {
+    picture.iter().map(|p| p[0]).sum::<f64>() / picture.len() as f64
+}
