@@ -443,3 +443,49 @@ fn a_point_light_falls_off_with_the_square_of_the_distance() {
             .is_none()
     );
 }
+
+/// Prints what each way to choose costs and gives; the source of [`luxel::light::TREE_FROM`].
+/// Run with `cargo test --release --test light -- --ignored --nocapture measure`.
+#[test]
+#[ignore = "a measurement"]
+fn measure_where_the_tree_pays() {
+    println!("lights  ns power  ns tree  variance power/tree  efficiency tree/power");
+    for count in [2, 3, 4, 6, 8, 12, 16, 32, 64, 256, 1024] {
+        let (mut ns, mut var) = ([0f64; 2], [0f64; 2]);
+        for seed in 0..8 {
+            let (geoms, emitters) = strewn(count, 100 + seed);
+            for (k, strategy) in [Strategy::Power, Strategy::Tree].into_iter().enumerate() {
+                let lights = Lights::with_strategy(emitters.clone(), &geoms, strategy);
+                let mut rng = Rng::new(seed);
+                for _ in 0..16 {
+                    let p = Vec3::from_array(std::array::from_fn(|_| rng.f32() * 10.0 - 5.0));
+                    let n = warp::uniform_sphere(rng.vec2());
+                    let from = receiver(p, n);
+                    let samples = 4000;
+                    let (mut sum, mut sum2) = (0f64, 0f64);
+                    let start = std::time::Instant::now();
+                    for _ in 0..samples {
+                        let s = lights.sample(&geoms, &from, rng.f32(), rng.vec2());
+                        let w = s.map_or(0.0, |s| (s.weight().g * s.wi.dot(n).max(0.0)) as f64);
+                        sum += w;
+                        sum2 += w * w;
+                    }
+                    ns[k] += start.elapsed().as_nanos() as f64 / samples as f64;
+                    let (m, m2) = (sum / samples as f64, sum2 / samples as f64);
+                    if m > 0.0 {
+                        var[k] += (m2 / (m * m) - 1.0).ln_1p() / 128.0;
+                    }
+                }
+            }
+        }
+        // A shadow ray costs about 300 ns beside the choice.
+        let cost = ns.map(|t| t / 128.0 + 300.0);
+        let gain = (var[0] - var[1]).exp();
+        println!(
+            "{count:6}  {:8.0}  {:7.0}  {gain:19.2}  {:21.2}",
+            cost[0] - 300.0,
+            cost[1] - 300.0,
+            gain * cost[0] / cost[1]
+        );
+    }
+}

@@ -101,7 +101,9 @@ pub enum Strategy {
     Tree,
 }
 
-/// From this many items on the tree pays for its descent (measured, see `examples` of tests/light.rs).
+/// From this many items on the tree pays for its descent. Measured by `tests/light.rs` on strewn lamps
+/// without shadows: with 8 the variance falls by 2 at equal samples, by 1.25 at equal time; with 4 the
+/// descent costs what it gains; with 64 it gains 2.9 and 1.4.
 pub const TREE_FROM: usize = 8;
 
 /// Share of a choice by power that goes to all items alike: power is blind to distance.
