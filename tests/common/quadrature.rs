@@ -59,25 +59,31 @@ const DEPTH: u32 = 12;
 /// the first moment).
 ///
 /// Most of it is expected within `focus`. Around that the box is cut at distances that grow fourfold: a
-/// tail that ends far from the focus would hide between the nodes of one large box.
+/// tail that ends far from the focus would hide between the nodes of one large box. Where less than
+/// `least` is found, a ridge may still hide, and all parts are looked at more closely.
 pub fn integrate(
     f: &impl Fn([f64; 2]) -> Moments,
     b: Box2,
     focus: Box2,
     tolerance: f64,
+    least: f64,
 ) -> Moments {
     let cuts = [0, 1].map(|i| cuts(b.lo[i], b.hi[i], focus.lo[i], focus.hi[i]));
-    let mut sum = [0.0; 4];
-    for x in cuts[0].windows(2) {
-        for y in cuts[1].windows(2) {
-            let part = Box2 {
-                lo: [x[0], y[0]],
-                hi: [x[1], y[1]],
-            };
-            sum = add(sum, refine(f, part, tolerance, DEPTH));
+    let parts = |forced: u32| {
+        let mut sum = [0.0; 4];
+        for x in cuts[0].windows(2) {
+            for y in cuts[1].windows(2) {
+                let part = Box2 {
+                    lo: [x[0], y[0]],
+                    hi: [x[1], y[1]],
+                };
+                sum = add(sum, refine(f, part, tolerance, DEPTH, forced));
+            }
         }
-    }
-    sum
+        sum
+    };
+    let sum = parts(0);
+    if sum[0] < least { parts(4) } else { sum }
 }
 
 /// Positions from `lo` to `hi`, dense around the interval from `a` to `b`.
@@ -98,15 +104,27 @@ fn cuts(lo: f64, hi: f64, a: f64, b: f64) -> Vec<f64> {
     cuts
 }
 
-fn refine(f: &impl Fn([f64; 2]) -> Moments, b: Box2, tolerance: f64, depth: u32) -> Moments {
-    let (coarse, fine) = (rule(f, b, &G3), rule(f, b, &G5));
-    if depth == 0 || (coarse[0] - fine[0]).abs() <= tolerance {
-        return fine;
+fn refine(
+    f: &impl Fn([f64; 2]) -> Moments,
+    b: Box2,
+    tolerance: f64,
+    depth: u32,
+    forced: u32,
+) -> Moments {
+    if forced == 0 {
+        let (coarse, fine) = (rule(f, b, &G3), rule(f, b, &G5));
+        if depth == 0 || (coarse[0] - fine[0]).abs() <= tolerance {
+            return fine;
+        }
     }
     let mut sum = [0.0; 4];
     for half in b.split(0, b.middle(0)) {
         for quarter in half.split(1, half.middle(1)) {
-            sum = add(sum, refine(f, quarter, 0.5 * tolerance, depth - 1));
+            let forced = forced.saturating_sub(1);
+            sum = add(
+                sum,
+                refine(f, quarter, 0.5 * tolerance, depth.saturating_sub(1), forced),
+            );
         }
     }
     sum
