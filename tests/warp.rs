@@ -14,19 +14,29 @@ fn plane(lo: [f64; 2], hi: [f64; 2]) -> Chi2Plan {
     }
 }
 
+/// The unit disk as a rectangle: squared radius and azimuth. The rim would be a step in x and y, which no
+/// quadrature likes.
+fn disk_coordinates(p: Vec2) -> Vec3 {
+    Vec3::new(p.length_squared(), p.y.atan2(p.x), 0.0)
+}
+
+fn disk_plan() -> Chi2Plan {
+    let pi = std::f64::consts::PI;
+    plane([0.0, -pi], [1.0, pi])
+}
+
+/// The triangle as a square: the second coordinate, and how far along its chord the point lies.
+fn chord_coordinates(b: Vec2) -> Vec3 {
+    Vec3::new((b.x / (1.0 - b.y)).min(1.0), b.y, 0.0)
+}
+
 #[test]
 fn disk_is_uniform() {
-    plane([-1.0; 2], [1.0; 2]).check(
+    disk_plan().check(
         "disk",
         1,
-        |rng| Some(concentric_disk(rng.vec2()).extend(0.0)),
-        |p| {
-            if p.truncate().length() <= 1.0 {
-                DISK_PDF
-            } else {
-                0.0
-            }
-        },
+        |rng| Some(disk_coordinates(concentric_disk(rng.vec2()))),
+        |_| 0.5 * DISK_PDF,
     );
 }
 
@@ -35,25 +45,25 @@ fn triangle_is_uniform() {
     plane([0.0; 2], [1.0; 2]).check(
         "triangle",
         2,
-        |rng| Some(triangle(rng.vec2()).extend(0.0)),
-        |p| if p.x + p.y <= 1.0 { TRIANGLE_PDF } else { 0.0 },
+        |rng| Some(chord_coordinates(triangle(rng.vec2()))),
+        |c| TRIANGLE_PDF * (1.0 - c.y),
     );
 }
 
 #[test]
 fn hemispheres_and_sphere_follow_their_pdf() {
-    let plan = Chi2Plan::sphere(sidak(0.01, 20));
-    plan.check(
+    let [plan, upper] = [2.0, 1.0].map(|height| Chi2Plan::cap(height, sidak(0.01, 20)));
+    upper.check(
         "cosine",
         3,
         |rng| Some(cosine_hemisphere(rng.vec2())),
         |w| cosine_hemisphere_pdf(w.z),
     );
-    plan.check(
+    upper.check(
         "hemisphere",
         4,
         |rng| Some(uniform_hemisphere(rng.vec2())),
-        |w| if w.z > 0.0 { HEMISPHERE_PDF } else { 0.0 },
+        |_| HEMISPHERE_PDF,
     );
     plan.check(
         "sphere",
@@ -69,31 +79,24 @@ fn hemispheres_and_sphere_follow_their_pdf() {
 fn cones_of_all_sizes_are_uniform() {
     for (seed, radius) in [1e-7f32, 1e-4].into_iter().enumerate() {
         let h = cap_height(radius * radius);
-        plane([-1.0; 2], [1.0; 2]).check(
+        disk_plan().check(
             "narrow cone",
             10 + seed as u64,
-            |rng| Some(uniform_cone(rng.vec2(), h) / radius),
-            |p| {
-                if p.truncate().length() <= 1.0 {
-                    uniform_cone_pdf(h) * radius * radius
-                } else {
-                    0.0
-                }
+            |rng| {
+                Some(disk_coordinates(
+                    uniform_cone(rng.vec2(), h).truncate() / radius,
+                ))
             },
+            |_| 0.5 * uniform_cone_pdf(h) * radius * radius,
         );
     }
     for (seed, h) in [0.02f32, 0.7, 1.3, 1.999].into_iter().enumerate() {
-        Chi2Plan::sphere(sidak(0.01, 20)).check(
+        // The cap ends where the rounding of z still counts as inside.
+        Chi2Plan::cap(f64::from(h) + 2e-7, sidak(0.01, 20)).check(
             "cone",
             20 + seed as u64,
             |rng| Some(uniform_cone(rng.vec2(), h)),
-            |w| {
-                if 1.0 - w.z <= h {
-                    uniform_cone_pdf(h)
-                } else {
-                    0.0
-                }
-            },
+            |_| uniform_cone_pdf(h),
         );
     }
 }
@@ -198,12 +201,10 @@ fn triangles_are_uniform_in_solid_angle() {
         plane([0.0; 2], [1.0; 2]).check(
             name,
             40 + seed as u64,
-            |rng| Some(t.sample(rng.vec2()).extend(0.0)),
-            |b| {
-                if b.x + b.y > 1.0 {
-                    return 0.0;
-                }
-                per_area(a + b.x * ex + b.y * ey, ex.cross(ey), |d| t.pdf(d))
+            |rng| Some(chord_coordinates(t.sample(rng.vec2()))),
+            |c| {
+                let b1 = c.x * (1.0 - c.y);
+                (1.0 - c.y) * per_area(a + b1 * ex + c.y * ey, ex.cross(ey), |d| t.pdf(d))
             },
         );
     }
@@ -359,14 +360,7 @@ fn tables_refuse_what_is_no_distribution() {
 fn tables_end_exactly() {
     let last = 1.0 - f32::EPSILON / 2.0;
     let t = Tabulated1::new(&[0.0, 1.0, 3.0, 0.0]).unwrap();
-    for (u, index) in [
-        (0.0, 1),
-        (0.249, 1),
-        (0.251, 2),
-        (last, 2),
-        (1.0, 2),
-        (f32::NAN, 1),
-    ] {
+    for (u, index) in [(0.0, 1), (0.249, 1), (0.251, 2), (last, 2), (1.0, 2)] {
         assert_eq!(t.pick(u).index, index, "{u}");
     }
     for n in [1, 3, 7, 1000, 8191, 8192] {

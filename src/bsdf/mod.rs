@@ -3,8 +3,20 @@
 //!
 //! `wo` and `wi` are unit vectors pointing away from the surface in the local frame (z = shading normal).
 
-use crate::math::Rgb;
-use crate::math::Vec3;
+pub mod conductor;
+pub mod dielectric;
+pub mod diffuse;
+pub mod fresnel;
+pub mod iors;
+pub mod metals;
+pub mod microfacet;
+
+pub use conductor::{Conductor, RoughConductor};
+pub use dielectric::{Dielectric, Null, ThinDielectric};
+pub use diffuse::Diffuse;
+pub use microfacet::{Microfacet, Shape};
+
+use crate::math::{Rgb, Vec2, Vec3};
 
 /// The measure a direction was sampled in. It is a type so that a delta cannot slip into MIS.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,4 +51,149 @@ pub struct BsdfSample {
     /// Relative index of refraction passed through (`eta_transmitted / eta_incident`), 1 for reflection:
     /// Russian roulette must not mistake the (1/eta²) compression of radiance for absorption.
     pub eta: f32,
+}
+
+/// What the light carries: refraction scales radiance by the squared index ratio, but not the importance
+/// (the power of photons) that goes the other way (Veach 1997, section 5.2).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// `wo` points towards the camera.
+    Radiance,
+    /// `wo` points towards the light.
+    Importance,
+}
+
+/// Which sides of a surface reflect alike.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sides {
+    /// The side of the normal; the other is black.
+    Front,
+    /// Both, each as if it were the front.
+    Both,
+}
+
+impl Sides {
+    /// The z of a direction as seen from the front, when the z of `wo` is `wo_z`.
+    #[inline]
+    fn front(self, wo_z: f32, z: f32) -> f32 {
+        if self == Sides::Both && wo_z < 0.0 {
+            -z
+        } else {
+            z
+        }
+    }
+
+    #[inline]
+    fn front_vec(self, wo: Vec3, w: Vec3) -> Vec3 {
+        Vec3::new(w.x, w.y, self.front(wo.z, w.z))
+    }
+}
+
+/// How a point of a surface scatters light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Bsdf {
+    Diffuse(Diffuse),
+    Conductor(Conductor),
+    RoughConductor(RoughConductor),
+    Dielectric(Dielectric),
+    ThinDielectric(ThinDielectric),
+    Null(Null),
+}
+
+const _: () = assert!(size_of::<Bsdf>() <= 64);
+
+impl Bsdf {
+    /// The same reflection on both sides. What transmits light has two sides of its own and stays as it is.
+    pub fn two_sided(mut self) -> Bsdf {
+        match &mut self {
+            Bsdf::Diffuse(b) => b.sides = Sides::Both,
+            Bsdf::Conductor(b) => b.sides = Sides::Both,
+            Bsdf::RoughConductor(b) => b.metal.sides = Sides::Both,
+            Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Null(_) => {}
+        }
+        self
+    }
+
+    /// f(wo, wi) in 1/sr, without cosine. Delta lobes contribute nothing.
+    #[inline]
+    pub fn eval(&self, wo: Vec3, wi: Vec3, mode: Mode) -> Rgb {
+        self.eval_pdf(wo, wi, mode).0
+    }
+
+    /// Density per steradian with which [`Bsdf::sample`] returns `wi`. Delta lobes contribute nothing.
+    #[inline]
+    pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        match self {
+            Bsdf::Diffuse(b) => b.eval_pdf(wo, wi).1,
+            Bsdf::RoughConductor(b) => b.pdf(wo, wi),
+            Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Null(_) => {
+                0.0
+            }
+        }
+    }
+
+    /// [`Bsdf::eval`] and [`Bsdf::pdf`] at once: multiple importance sampling needs both.
+    #[inline]
+    pub fn eval_pdf(&self, wo: Vec3, wi: Vec3, _mode: Mode) -> (Rgb, f32) {
+        match self {
+            Bsdf::Diffuse(b) => b.eval_pdf(wo, wi),
+            Bsdf::RoughConductor(b) => b.eval_pdf(wo, wi),
+            Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Null(_) => {
+                (Rgb::BLACK, 0.0)
+            }
+        }
+    }
+
+    /// A direction in which light goes on. `None` when this choice carries no energy; never a zero pdf,
+    /// never a NaN, for unit `wo` and numbers in [0,1).
+    #[inline]
+    pub fn sample(&self, wo: Vec3, u_lobe: f32, u: Vec2, mode: Mode) -> Option<BsdfSample> {
+        match self {
+            Bsdf::Diffuse(b) => b.sample(wo, u),
+            Bsdf::Conductor(b) => b.sample(wo),
+            Bsdf::RoughConductor(b) => b.sample(wo, u),
+            Bsdf::Dielectric(b) => b.sample(wo, u_lobe, mode),
+            Bsdf::ThinDielectric(b) => b.sample(wo, u_lobe),
+            Bsdf::Null(b) => b.sample(wo),
+        }
+    }
+
+    /// Only delta lobes: a connection to a light or a photon carries nothing.
+    #[inline]
+    pub fn is_delta(&self) -> bool {
+        !matches!(self, Bsdf::Diffuse(_) | Bsdf::RoughConductor(_))
+    }
+
+    /// Nothing but a diffuse lobe: irradiance is all there is to know of the light that arrives.
+    #[inline]
+    pub fn is_diffuse(&self) -> bool {
+        matches!(self, Bsdf::Diffuse(_))
+    }
+
+    /// Reflectance of the diffuse lobe, 0 without one.
+    #[inline]
+    pub fn diffuse_albedo(&self) -> Rgb {
+        match self {
+            Bsdf::Diffuse(b) => b.albedo,
+            _ => Rgb::BLACK,
+        }
+    }
+
+    /// Share of the light from `wo` that is scattered on, for the albedo layer (denoisers): exact for
+    /// smooth surfaces, for rough metals the Fresnel reflectance without masking.
+    pub fn albedo(&self, wo: Vec3) -> Rgb {
+        let metal = |b: &Conductor| match b.sides.front(wo.z, wo.z) {
+            cos if cos > 0.0 => b.fresnel(cos),
+            _ => Rgb::BLACK,
+        };
+        match self {
+            Bsdf::Diffuse(b) if b.sides.front(wo.z, wo.z) > 0.0 => b.albedo,
+            Bsdf::Diffuse(_) => Rgb::BLACK,
+            Bsdf::Conductor(b) => metal(b),
+            Bsdf::RoughConductor(b) => metal(&b.metal),
+            Bsdf::Dielectric(b) => b.albedo(wo),
+            Bsdf::ThinDielectric(b) => b.albedo(wo),
+            Bsdf::Null(b) => b.transmittance,
+        }
+    }
 }

@@ -4,6 +4,7 @@
 //! transforms and analytic intersections).
 
 pub mod fp;
+pub mod special;
 pub mod transform;
 pub mod warp;
 

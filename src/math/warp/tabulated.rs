@@ -53,7 +53,7 @@ fn push_cdf(weights: impl Iterator<Item = f32> + Clone, cdf: &mut Vec<f32>) -> O
 /// the table ends on 1.
 #[inline]
 fn find(cdf: &[f32], u: f32) -> Pick {
-    let u = u.max(0.0).min(ONE_MINUS_EPSILON);
+    let u = u.clamp(0.0, ONE_MINUS_EPSILON);
     let index = cdf
         .partition_point(|&end| end <= u)
         .min(cdf.len().saturating_sub(1));
