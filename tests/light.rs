@@ -10,7 +10,7 @@ use directions::DirectionCheck;
 use luxel::bsdf::Density;
 use luxel::geom::{Geometry, Hit, Mesh, Ray, ShapeId};
 use luxel::light::{Emitter, EmitterSample, Lights, Strategy};
-use luxel::math::{DVec3, Frame, Rgb, Transform, Vec2, Vec3, warp};
+use luxel::math::{DVec3, Rgb, Transform, Vec2, Vec3, warp};
 use shapes::{cylinder, disk, nearest, receiver, scale, sphere, triangle};
 use std::f64::consts::PI;
 
