@@ -1,10 +1,13 @@
 //! Points on shapes against figures measured with Mitsuba 3.9.1 (`ray_intersect`, scalar_rgb), and the
 //! properties that hold for every shape: error bounds, area densities, grazing and distant rays.
 
-use luxel::geom::{Cylinder, Disk, Geometry, Hit, Mesh, MeshError, RawHit, Ray, ShapeId, Sphere};
+mod shapes;
+
+use luxel::geom::{Cylinder, Geometry, Hit, Mesh, MeshError, Ray, Sphere};
 use luxel::math::{DVec3, Frame, Transform, Vec2, Vec3};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
+use shapes::{cylinder, disk, intersect, scale, sphere, turned};
 
 fn uniform(rng: &mut Pcg64Mcg) -> f32 {
     (rng.next_u32() >> 8) as f32 / (1 << 24) as f32
@@ -17,57 +20,6 @@ fn direction(rng: &mut Pcg64Mcg) -> Vec3 {
             return v.normalize();
         }
     }
-}
-
-/// Nearest triangle by brute force in f64, or the analytic intersection.
-fn intersect(g: &Geometry, ray: &Ray) -> Option<Hit> {
-    let raw = |t, prim, uv| RawHit {
-        t,
-        shape: ShapeId(0),
-        prim,
-        uv,
-    };
-    let Geometry::Mesh(m) = g else {
-        let (t, uv) = g.intersect_analytic(ray, ray.t_max)?;
-        return Some(g.hit(ray, &raw(t, 0, uv)));
-    };
-    let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
-    let mut best: Option<RawHit> = None;
-    for prim in 0..m.indices().len() as u32 {
-        let [p0, p1, p2] = m.triangle(prim).map(|p| p.as_dvec3());
-        let (e1, e2) = (p1 - p0, p2 - p0);
-        let det = d.cross(e2).dot(e1);
-        let b1 = d.cross(e2).dot(o - p0) / det;
-        let b2 = (o - p0).cross(e1).dot(d) / det;
-        let t = (o - p0).cross(e1).dot(e2) / det;
-        let inside = b1 >= 0.0 && b2 >= 0.0 && b1 + b2 <= 1.0 && t > 0.0;
-        if inside && best.is_none_or(|b| (t as f32) < b.t) {
-            best = Some(raw(t as f32, prim, Vec2::new(b1 as f32, b2 as f32)));
-        }
-    }
-    best.map(|b| g.hit(ray, &b))
-}
-
-fn scale(x: f64, y: f64, z: f64) -> Transform {
-    Transform::scale(DVec3::new(x, y, z)).unwrap()
-}
-
-fn turned() -> Transform {
-    Transform::translate(DVec3::new(0.2, 0.1, 0.3))
-        * Transform::rotate(DVec3::new(0.0, 0.6, 0.8), 40.0).unwrap()
-        * scale(1.3, 1.3, 1.3)
-}
-
-fn sphere(t: Transform, flip: bool) -> Geometry {
-    Geometry::Sphere(Sphere::new(t, flip).unwrap())
-}
-
-fn cylinder(t: Transform, flip: bool) -> Geometry {
-    Geometry::Cylinder(Cylinder::new(t, flip).unwrap())
-}
-
-fn disk(t: Transform, flip: bool) -> Geometry {
-    Geometry::Disk(Disk::new(t, flip))
 }
 
 /// Two triangles around the z axis that share an edge, without normals.

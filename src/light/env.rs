@@ -263,11 +263,12 @@ fn pick(n: usize, u: f64, end: impl Fn(usize) -> f64) -> (usize, f64) {
 
 /// Inverse of the integral of a density that runs linearly from `a` to `b` over [0,1].
 fn linear(a: f64, b: f64, u: f64) -> f64 {
-    let sum = a + b;
-    if sum <= 0.0 {
-        return u;
+    let root = a + (a * a + u * (b * b - a * a)).max(0.0).sqrt();
+    if root > 0.0 {
+        (u * (a + b) / root).clamp(0.0, 1.0)
+    } else {
+        u
     }
-    (u * sum / (a + (a * a + u * (b * b - a * a)).max(0.0).sqrt())).clamp(0.0, 1.0)
 }
 
 /// What lies between two rows: (a + (b - a) f) sin θ for θ = theta + f step, f in [0,1].

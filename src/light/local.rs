@@ -88,8 +88,9 @@ pub(crate) fn parts_of(shape: ShapeId, geometry: &Geometry) -> Vec<Part> {
 /// Whether triangles `prim` and `prim + 1` are the two halves of a rectangle, up to a few roundings of
 /// its corners: the vertices at its right angles that they do not share.
 fn rectangle_corners(mesh: &Mesh, prim: u32) -> Option<[u8; 2]> {
-    let next = mesh.indices().get(prim as usize + 1)?;
-    let _ = next;
+    if prim as usize + 1 >= mesh.indices().len() {
+        return None;
+    }
     let (a, b) = (mesh.triangle(prim), mesh.triangle(prim + 1));
     let at = |t: &[Vec3; 3], k: usize| t[k % 3].as_dvec3();
     (0..9).map(|i| (i / 3, i % 3)).find_map(|(i, j)| {

@@ -4,7 +4,7 @@
 //! probability, t-tests of the means of the coordinates, and the integral of the density against the
 //! share of samples that carry something. The first finds samples in wrong places, the others see errors
 //! of one per cent of shape or scale. Seeds are fixed and were not chosen.
-#![allow(dead_code)] // each test binary uses a part
+#![allow(dead_code, unused_imports)] // each test binary uses a part
 
 pub mod plan;
 pub mod quadrature;

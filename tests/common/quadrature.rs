@@ -35,50 +35,96 @@ impl Box2 {
         [a, b]
     }
 
+    pub fn around(points: &[[f64; 2]]) -> Option<Box2> {
+        let &first = points.first()?;
+        let point = Box2 {
+            lo: first,
+            hi: first,
+        };
+        Some(points.iter().fold(point, |b, p| Box2 {
+            lo: std::array::from_fn(|i| b.lo[i].min(p[i])),
+            hi: std::array::from_fn(|i| b.hi[i].max(p[i])),
+        }))
+    }
+
     pub fn middle(&self, axis: usize) -> f64 {
         0.5 * (self.lo[axis] + self.hi[axis])
     }
 }
 
-/// How often a box may be quartered, and how often it is when it looks too empty.
+/// How often a box may be quartered.
 const DEPTH: u32 = 12;
-const FORCED: u32 = 4;
 
 /// Integral of `f` over the box, refined where two rules disagree by more than `tolerance` (absolute, of
-/// the first moment). A box is expected to hold at least `least`: when it seems to hold less, a peak may
-/// hide between the nodes, and it is looked at more closely.
-pub fn integrate(f: &impl Fn([f64; 2]) -> Moments, b: Box2, tolerance: f64, least: f64) -> Moments {
-    let (coarse, fine) = (rule(f, b, &G3), rule(f, b, &G5));
-    if (coarse[0] - fine[0]).abs() <= tolerance && fine[0] >= least {
-        return fine;
-    }
-    let forced = if fine[0] < least { FORCED } else { 1 };
-    quarters(f, b, tolerance, DEPTH, forced)
+/// the first moment).
+///
+/// Most of it is expected within `focus`. Around that the box is cut at distances that grow fourfold: a
+/// tail that ends far from the focus would hide between the nodes of one large box. Where less than
+/// `least` is found, a ridge may still hide, and all parts are looked at more closely.
+pub fn integrate(
+    f: &impl Fn([f64; 2]) -> Moments,
+    b: Box2,
+    focus: Box2,
+    tolerance: f64,
+    least: f64,
+) -> Moments {
+    let cuts = [0, 1].map(|i| cuts(b.lo[i], b.hi[i], focus.lo[i], focus.hi[i]));
+    let parts = |forced: u32| {
+        let mut sum = [0.0; 4];
+        for x in cuts[0].windows(2) {
+            for y in cuts[1].windows(2) {
+                let part = Box2 {
+                    lo: [x[0], y[0]],
+                    hi: [x[1], y[1]],
+                };
+                sum = add(sum, refine(f, part, tolerance, DEPTH, forced));
+            }
+        }
+        sum
+    };
+    let sum = parts(0);
+    if sum[0] < least { parts(4) } else { sum }
 }
 
-fn quarters(
+/// Positions from `lo` to `hi`, dense around the interval from `a` to `b`.
+fn cuts(lo: f64, hi: f64, a: f64, b: f64) -> Vec<f64> {
+    let width = (b - a).max(1e-7 * (hi - lo));
+    let mut cuts = vec![lo, hi];
+    let mut step = 0.5 * width;
+    while step < hi - lo {
+        for at in [a - step, b + step] {
+            // No slivers: the last step reaches the end.
+            if at - lo > step && hi - at > step {
+                cuts.push(at);
+            }
+        }
+        step *= 4.0;
+    }
+    cuts.sort_by(f64::total_cmp);
+    cuts
+}
+
+fn refine(
     f: &impl Fn([f64; 2]) -> Moments,
     b: Box2,
     tolerance: f64,
     depth: u32,
     forced: u32,
 ) -> Moments {
-    let [left, right] = b.split(0, b.middle(0));
+    if forced == 0 {
+        let (coarse, fine) = (rule(f, b, &G3), rule(f, b, &G5));
+        if depth == 0 || (coarse[0] - fine[0]).abs() <= tolerance {
+            return fine;
+        }
+    }
     let mut sum = [0.0; 4];
-    for half in [left, right] {
+    for half in b.split(0, b.middle(0)) {
         for quarter in half.split(1, half.middle(1)) {
-            let refine = |t| quarters(f, quarter, t, depth - 1, forced.saturating_sub(1));
-            let part = if forced > 1 {
-                refine(tolerance)
-            } else {
-                let (coarse, fine) = (rule(f, quarter, &G3), rule(f, quarter, &G5));
-                if depth == 0 || (coarse[0] - fine[0]).abs() <= tolerance {
-                    fine
-                } else {
-                    refine(0.5 * tolerance)
-                }
-            };
-            sum = add(sum, part);
+            let forced = forced.saturating_sub(1);
+            sum = add(
+                sum,
+                refine(f, quarter, 0.5 * tolerance, depth.saturating_sub(1), forced),
+            );
         }
     }
     sum
