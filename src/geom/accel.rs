@@ -320,3 +320,6 @@ fn improve(tree: Vec<BinaryNode>) -> Vec<BinaryNode> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests;

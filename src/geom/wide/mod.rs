@@ -172,6 +172,29 @@ impl Wide {
         size_of_val(&self.nodes[..]) + size_of_val(&self.packs[..])
     }
 
+    /// A hash of every bit of the tree (FNV-1a over words), to compare trees with.
+    pub fn fingerprint(&self) -> u64 {
+        let mut hash = 0xcbf2_9ce4_8422_2325u64;
+        let mut add = |x: u32| hash = (hash ^ u64::from(x)).wrapping_mul(0x0100_0000_01b3);
+        for node in &self.nodes {
+            let planes = node.planes.as_flattened();
+            planes
+                .iter()
+                .flat_map(|l| l.0)
+                .for_each(|x| add(x.to_bits()));
+            node.child.iter().for_each(|c| add(c.0));
+        }
+        for pack in &self.packs {
+            let corners = pack.corner.as_flattened();
+            corners
+                .iter()
+                .flat_map(|l| l.0)
+                .for_each(|x| add(x.to_bits()));
+            pack.id.iter().for_each(|&id| add(id));
+        }
+        hash
+    }
+
     /// Nodes, packs, and the mean number of children and of triangles in them: how well they are filled.
     pub fn stats(&self) -> (usize, usize, f64, f64) {
         let used = |n: usize, of: usize| n as f64 / of.max(1) as f64;

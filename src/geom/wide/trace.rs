@@ -237,7 +237,7 @@ pub fn trace<I: Isa, L: Leaf, const ANY: bool>(
             if L::OTHERS && count == 0 {
                 hit = search.other(first as u32, ray, leaf);
             }
-            for pack in &wide.packs[first..first + count] {
+            for pack in wide.packs.get(first..first + count).unwrap_or(&[]) {
                 hit |= search.pack(isa, pack, &o, &shear, leaf);
                 if ANY && hit {
                     return search.found;
