@@ -289,7 +289,8 @@ fn pathological_inputs_build_shallow_trees() {
             Vec3::new(0.0, s, s),
         ]
     };
-    let cases: [(&str, &dyn Fn(u32) -> [Vec3; 3], u32); 5] = [
+    type Case<'a> = (&'a str, &'a dyn Fn(u32) -> [Vec3; 3], u32);
+    let cases: [Case<'_>; 5] = [
         ("identical", &|_| unit, n),
         ("row", &|i| unit.map(|p| p + i as f32 * Vec3::X), n),
         ("nested", &nested, n),

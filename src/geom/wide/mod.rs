@@ -15,7 +15,7 @@ mod trace;
 pub use trace::{Found, Leaf};
 
 use super::Ray;
-use crate::math::Aabb;
+use crate::math::{Aabb, Vec3};
 use avx2::Avx2;
 use isa::Plain;
 
@@ -118,6 +118,14 @@ impl Pack {
         corner: [[Lanes([f32::NAN; WIDTH]); 3]; 3],
         id: [u32::MAX; WIDTH],
     };
+
+    fn set(&mut self, lane: usize, corners: [Vec3; 3]) {
+        for (axis, to) in self.corner.iter_mut().enumerate() {
+            for (to, corner) in to.iter_mut().zip(corners) {
+                to.0[lane] = corner[axis];
+            }
+        }
+    }
 }
 
 /// The tree as it is traversed.
