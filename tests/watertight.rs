@@ -215,8 +215,8 @@ fn axis_parallel_rays_meet_the_corners_of_a_grid() {
     }
 }
 
-/// A ray in the plane of a flat mesh, and one that grazes a face of a cube, must do no harm: they
-/// either hit or not, but the rays next to them are unaffected.
+/// A ray in the plane of a flat mesh, and one that grazes a face of a cube, must do no harm: it may
+/// hit or not, but the ray next to it hits.
 #[test]
 fn rays_within_a_plane_end() {
     let mesh = cube();
@@ -228,16 +228,7 @@ fn rays_within_a_plane_end() {
             if let Some(hit) = accel.intersect(&ray) {
                 assert!(hit.t >= 1.5 && hit.t <= 4.5, "{hit:?}");
             }
-            let inside = Ray::new(
-                Vec3::new(
-                    0.0,
-                    y.next_down()
-                        .min(1.0f32.next_down())
-                        .max(-1.0f32.next_down()),
-                    0.0,
-                ),
-                d,
-            );
+            let inside = Ray::new(Vec3::new(0.0, y * 1.0f32.next_down(), 0.0), d);
             assert!(accel.intersect(&inside).is_some());
         }
     }

@@ -82,8 +82,8 @@ fn compare(scene: &str, mesh: &scenes::Mesh, accel: &Accel, sets: &[(&str, Vec<R
                 nearest(accel, rays)
             }
         };
-        let runs: [&dyn Fn(&[Ray]) -> usize; 3] =
-            [&ours, &|r| through(&fast, r), &|r| through(&robust, r)];
+        type Run<'a> = &'a dyn Fn(&[Ray]) -> usize;
+        let runs: [Run<'_>; 3] = [&ours, &|r| through(&fast, r), &|r| through(&robust, r)];
         let mut best = [const { Vec::new() }; 3];
         let mut hits = [0; 3];
         for round in 0..7 {

@@ -202,7 +202,9 @@ pub fn trace<I: Isa, L: Leaf, const ANY: bool>(
             }
             if ANY {
                 while hits != 0 {
-                    stack.push(Entry::new(node.child[take(&mut hits)], 0.0));
+                    let slot = take(&mut hits);
+                    wide.prefetch(isa, node.child[slot]);
+                    stack.push(Entry::new(node.child[slot], 0.0));
                 }
                 continue;
             }
