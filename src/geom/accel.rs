@@ -8,7 +8,7 @@
 use super::wide::binary::{self, BinaryNode, Prim, half_area};
 use super::wide::{self, Found, Leaf, OTHER, Wide, collapse};
 use super::{RawHit, Ray, ShapeId};
-use crate::math::{Aabb, Vec2, Vec3};
+use crate::math::{Aabb, DVec3, Vec2, Vec3};
 use obvhs::bvh2::{Bvh2, node::Bvh2Node, reinsertion::ReinsertionOptimizer};
 use rayon::prelude::*;
 
@@ -53,7 +53,7 @@ impl Hooks for () {
 /// The tree over a scene, immutable.
 pub struct Accel {
     wide: Wide,
-    /// Shape and number of the first triangle of each mesh; the last entry is followed by none.
+    /// Number of the first triangle of each mesh, ascending, and its shape.
     meshes: Vec<(u32, ShapeId)>,
     /// Shapes that are no mesh.
     others: Vec<ShapeId>,
@@ -261,7 +261,7 @@ fn corners(mesh: &MeshRef<'_>, t: &[u32; 3]) -> Option<[Vec3; 3]> {
 fn usable([a, b, c]: [Vec3; 3]) -> bool {
     let finite = a.is_finite() && b.is_finite() && c.is_finite();
     let [a, b, c] = [a, b, c].map(Vec3::as_dvec3);
-    finite && (b - a).cross(c - a) != glam::DVec3::ZERO
+    finite && (b - a).cross(c - a) != DVec3::ZERO
 }
 
 impl collapse::Source for Input<'_> {
@@ -320,3 +320,6 @@ fn improve(tree: Vec<BinaryNode>) -> Vec<BinaryNode> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests;

@@ -8,7 +8,7 @@ pub mod special;
 pub mod transform;
 pub mod warp;
 
-pub use glam::{DVec2, DVec3, Vec2, Vec3};
+pub use glam::{DVec2, DVec3, Vec2, Vec3, Vec3A, Vec4};
 pub use std::f32::consts::PI;
 pub use transform::Transform;
 

@@ -4,8 +4,7 @@
 //! Work is O(n log n) for any input, also for boxes that are all alike, nested or in a row: where no
 //! plane separates them the list is halved. The tree does not depend on the number of threads.
 
-use crate::math::Aabb;
-use glam::{Vec3A, Vec4};
+use crate::math::{Aabb, Vec3A, Vec4};
 use rayon::prelude::*;
 
 /// A primitive to build over. The halves of its number ride in the fourth lanes of the corners, as
@@ -40,7 +39,7 @@ impl Prim {
         }
     }
 
-    /// Twice the centre; only compared with its like. Halved first, so that it cannot overflow.
+    /// The centre; halved before the sum, so that it cannot overflow.
     fn center(&self) -> Vec3A {
         Vec3A::from_vec4(self.min * 0.5 + self.max * 0.5)
     }

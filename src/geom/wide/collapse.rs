@@ -132,7 +132,9 @@ impl<S: Source> Plan<'_, S> {
             for roots in 2..WIDTH {
                 costs[roots - 1] = one.min(distribute(&l.0, &r.0, roots).0);
             }
-            (costs, triangles, as_leaf <= as_node)
+            // Both are infinite where areas overflow.
+            let is_leaf = triangles <= LEAF_MAX && as_leaf <= as_node;
+            (costs, triangles, is_leaf)
         };
         let to = &self.cost[n];
         for (to, cost) in to.iter().zip(costs) {
@@ -245,11 +247,7 @@ impl<S: Source> Plan<'_, S> {
                 let Some(corners) = self.source.triangle(id) else {
                     continue;
                 };
-                for axis in 0..3 {
-                    for k in 0..3 {
-                        pack.corner[axis][k].0[lane] = corners[k][axis];
-                    }
-                }
+                pack.set(lane, corners);
                 pack.id[lane] = id;
             }
             out.packs.push(pack);

@@ -25,7 +25,7 @@ pub trait Isa: Copy {
     fn le(self, a: Self::F, b: Self::F) -> u32;
     fn lt(self, a: Self::F, b: Self::F) -> u32;
     fn eq(self, a: Self::F, b: Self::F) -> u32;
-    /// Fetch `lines` cache lines from `p` on; `p` need not be valid.
+    /// Fetch the cache lines of a `T` at `p`, which need not be valid.
     fn prefetch<T>(self, p: *const T);
 }
 

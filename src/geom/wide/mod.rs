@@ -15,7 +15,7 @@ mod trace;
 pub use trace::{Found, Leaf};
 
 use super::Ray;
-use crate::math::Aabb;
+use crate::math::{Aabb, Vec3};
 use avx2::Avx2;
 use isa::Plain;
 
@@ -118,6 +118,14 @@ impl Pack {
         corner: [[Lanes([f32::NAN; WIDTH]); 3]; 3],
         id: [u32::MAX; WIDTH],
     };
+
+    fn set(&mut self, lane: usize, corners: [Vec3; 3]) {
+        for (axis, to) in self.corner.iter_mut().enumerate() {
+            for (to, corner) in to.iter_mut().zip(corners) {
+                to.0[lane] = corner[axis];
+            }
+        }
+    }
 }
 
 /// The tree as it is traversed.
@@ -170,6 +178,29 @@ impl Wide {
     /// Memory of nodes and packs.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.nodes[..]) + size_of_val(&self.packs[..])
+    }
+
+    /// A hash of every bit of the tree (FNV-1a over words), to compare trees with.
+    pub fn fingerprint(&self) -> u64 {
+        let mut hash = 0xcbf2_9ce4_8422_2325u64;
+        let mut add = |x: u32| hash = (hash ^ u64::from(x)).wrapping_mul(0x0100_0000_01b3);
+        for node in &self.nodes {
+            let planes = node.planes.as_flattened();
+            planes
+                .iter()
+                .flat_map(|l| l.0)
+                .for_each(|x| add(x.to_bits()));
+            node.child.iter().for_each(|c| add(c.0));
+        }
+        for pack in &self.packs {
+            let corners = pack.corner.as_flattened();
+            corners
+                .iter()
+                .flat_map(|l| l.0)
+                .for_each(|x| add(x.to_bits()));
+            pack.id.iter().for_each(|&id| add(id));
+        }
+        hash
     }
 
     /// Nodes, packs, and the mean number of children and of triangles in them: how well they are filled.

@@ -202,7 +202,9 @@ pub fn trace<I: Isa, L: Leaf, const ANY: bool>(
             }
             if ANY {
                 while hits != 0 {
-                    stack.push(Entry::new(node.child[take(&mut hits)], 0.0));
+                    let slot = take(&mut hits);
+                    wide.prefetch(isa, node.child[slot]);
+                    stack.push(Entry::new(node.child[slot], 0.0));
                 }
                 continue;
             }
@@ -237,7 +239,7 @@ pub fn trace<I: Isa, L: Leaf, const ANY: bool>(
             if L::OTHERS && count == 0 {
                 hit = search.other(first as u32, ray, leaf);
             }
-            for pack in &wide.packs[first..first + count] {
+            for pack in wide.packs.get(first..first + count).unwrap_or(&[]) {
                 hit |= search.pack(isa, pack, &o, &shear, leaf);
                 if ANY && hit {
                     return search.found;
@@ -330,24 +332,29 @@ impl Search {
         }
         let exact = inside & (isa.eq(u, zero) | isa.eq(v, zero) | isa.eq(w, zero));
 
-        let det = isa.add(isa.add(u, v), w);
+        // Barycentric weights before distances: products of three lengths would leave the range of a
+        // float for scenes of 1e-13 or 1e13.
+        let inv_det = isa.div(isa.splat(1.0), isa.add(isa.add(u, v), w));
+        let (u, v, w) = (
+            isa.mul(u, inv_det),
+            isa.mul(v, inv_det),
+            isa.mul(w, inv_det),
+        );
         let depth = isa.add(
             isa.add(isa.mul(u, a[2]), isa.mul(v, b[2])),
             isa.mul(w, c[2]),
         );
-        let t = isa.div(isa.mul(isa.splat(s.sz), depth), det);
+        let t = isa.mul(isa.splat(s.sz), depth);
         let mut hits = isa.lt(zero, t) & isa.lt(t, isa.splat(self.best)) & inside & !exact;
         let mut hit = false;
         if hits != 0 {
-            let (t, v, w, det) = (isa.store(t), isa.store(v), isa.store(w), isa.store(det));
+            let (t, v, w) = (isa.store(t), isa.store(v), isa.store(w));
             while hits != 0 {
                 let i = take(&mut hits);
-                if t.0[i] < self.best {
-                    let uv = Vec2::new(v.0[i] / det.0[i], w.0[i] / det.0[i]);
-                    if !L::FILTERS || leaf.accept(pack.id[i], uv) {
-                        self.keep(t.0[i], pack.id[i], uv);
-                        hit = true;
-                    }
+                let uv = Vec2::new(v.0[i], w.0[i]);
+                if t.0[i] < self.best && (!L::FILTERS || leaf.accept(pack.id[i], uv)) {
+                    self.keep(t.0[i], pack.id[i], uv);
+                    hit = true;
                 }
             }
         }
