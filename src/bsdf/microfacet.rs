@@ -190,16 +190,23 @@ fn beckmann_slope(cos: f32, sin: f32, u: f32) -> f32 {
             b = 0.5 * (lo + hi);
         }
         x = erf_inv(b);
-        let excess = cos * (1.0 + b) + sin * FRAC_1_SQRT_PI * (-x * x).exp() - target;
-        if excess.abs() < 1e-6 * area {
-            break;
+        let gauss = (-x * x).exp();
+        let excess = cos * (1.0 + b) + sin * FRAC_1_SQRT_PI * gauss - target;
+        let step = excess / (cos - sin * x);
+        // The same step in x: when it is short it leaves an error of its square, so it is the last one.
+        let step_x = step / (2.0 * FRAC_1_SQRT_PI * gauss);
+        if step_x.abs() < 1e-3 {
+            return x - step_x;
+        }
+        if excess.abs() < 2.0 * f32::EPSILON * area {
+            break; // far out in the tail, where the sum resolves no more
         }
         if excess > 0.0 {
             hi = b;
         } else {
             lo = b;
         }
-        b -= excess / (cos - sin * x);
+        b -= step;
     }
     x
 }
