@@ -99,7 +99,7 @@ pub fn uniform_cone_pdf(h_max: f32) -> f32 {
     1.0 / (2.0 * PI * h_max)
 }
 
-/// `1 - cos` of an angle of at most a right angle from its squared sine in [0,1], without cancellation.
+/// `1 - cos` of an angle of at most a right angle from its squared sine in 0..1, without cancellation.
 #[inline]
 pub fn cap_height(sin2: f32) -> f32 {
     sin2 / (1.0 + safe_sqrt(1.0 - sin2))
