@@ -171,7 +171,7 @@ fn values_are_reciprocal() {
         let (a, b) = (bsdf.eval(wo, wi, R), bsdf.eval(wi, wo, Mode::Importance));
         for c in 0..3 {
             assert!(
-                (a[c] - b[c]).abs() <= 2e-5 * a[c].abs(),
+                (a[c] - b[c]).abs() <= 1e-6 * a[c].abs(),
                 "{bsdf:?} {wo} {wi}: {a:?} {b:?}"
             );
         }
@@ -312,7 +312,7 @@ fn extremes_stay_finite() {
             x if x < 0.4 => 1.0,
             _ => rng.f32(),
         };
-        let (sin, phi) = ((1.0 - z * z).sqrt(), 6.28 * rng.f32());
+        let (sin, phi) = ((1.0 - z * z).sqrt(), std::f32::consts::TAU * rng.f32());
         let wo = Vec3::new(sin * phi.cos(), sin * phi.sin(), z);
         let (u_lobe, u) = (
             number(&mut rng),
@@ -448,11 +448,11 @@ fn dielectric_laws() {
             .unwrap();
         assert_eq!(photon.weight, Rgb::WHITE, "photons keep their power");
         // The way back is the way in, with the inverse scale. (Not at grazing: the cosine is lost.)
-        if let Some(back) = bsdf.sample(s.wi, 1.0 - f32::EPSILON, u, R) {
-            if wo.z.abs() > 0.05 {
-                assert!((back.wi - wo).length() < 2e-5, "{eta} {wo} {}", back.wi);
-                assert!((back.weight.g * s.weight.g - 1.0).abs() < 1e-5);
-            }
+        if let Some(back) = bsdf.sample(s.wi, 1.0 - f32::EPSILON, u, R)
+            && wo.z.abs() > 0.05
+        {
+            assert!((back.wi - wo).length() < 2e-5, "{eta} {wo} {}", back.wi);
+            assert!((back.weight.g * s.weight.g - 1.0).abs() < 1e-5);
         }
     }
 }

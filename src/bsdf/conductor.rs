@@ -51,47 +51,69 @@ pub struct RoughConductor {
     pub metal: Conductor,
 }
 
+/// Both directions seen from the front, and the facet normal that reflects one into the other.
+struct HalfVector {
+    wo: Vec3,
+    wi: Vec3,
+    m: Vec3,
+    /// D(m), > 0.
+    d: f32,
+    /// Cosine between `m` and either direction.
+    cos: f32,
+}
+
 impl RoughConductor {
     #[inline]
     pub(super) fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
-        let Some((wo, wi, m, d)) = self.half_vector(wo, wi) else {
+        let Some(half) = self.half_vector(wo, wi) else {
             return (Rgb::BLACK, 0.0);
         };
-        let masking = self.facets.g1_over_cos(wo);
-        let f = 0.25 * d * masking * self.facets.g1_over_cos(wi);
-        let pdf = if self.facets.visible {
-            0.25 * d * masking
-        } else {
-            0.25 * d * m.z / wo.dot(m)
-        };
-        (self.metal.fresnel(wo.dot(m)) * f, pdf)
+        let masking = self.facets.g1_over_cos(half.wo);
+        let f = 0.25 * half.d * (masking * self.facets.g1_over_cos(half.wi));
+        let pdf = self.reflected_pdf(half.d, masking, half.m.z, half.cos);
+        (self.metal.fresnel(half.cos) * f, pdf)
     }
 
     #[inline]
     pub(super) fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
-        let Some((wo, _, m, d)) = self.half_vector(wo, wi) else {
-            return 0.0;
-        };
+        self.half_vector(wo, wi).map_or(0.0, |half| {
+            let masking = self.facets.g1_over_cos(half.wo);
+            self.reflected_pdf(half.d, masking, half.m.z, half.cos)
+        })
+    }
+
+    /// Density of the reflected direction: that of the facet normal over 4 cos (Walter et al. 2007,
+    /// equation 14). `masking` is G1(wo) / wo.z, `cos` the angle between facet normal and `wo`.
+    #[inline]
+    fn reflected_pdf(&self, d: f32, masking: f32, m_z: f32, cos: f32) -> f32 {
         if self.facets.visible {
-            0.25 * d * self.facets.g1_over_cos(wo)
+            0.25 * d * masking
         } else {
-            0.25 * d * m.z / wo.dot(m)
+            0.25 * d * m_z / cos
         }
     }
 
-    /// Both directions seen from the front, the facet normal that reflects one into the other, and its
-    /// density D. `None` where nothing is reflected.
     #[inline]
-    fn half_vector(&self, wo: Vec3, wi: Vec3) -> Option<(Vec3, Vec3, Vec3, f32)> {
+    fn half_vector(&self, wo: Vec3, wi: Vec3) -> Option<HalfVector> {
         let sides = self.metal.sides;
         let wi = sides.front_vec(wo, wi);
         let wo = sides.front_vec(wo, wo);
         if wo.z <= 0.0 || wi.z <= 0.0 {
             return None;
         }
-        let m = (wo + wi).try_normalize()?;
+        let h = wo + wi;
+        let length = h.length();
+        let m = h / length;
         let d = self.facets.d(m);
-        (d > 0.0 && wo.dot(m) > 0.0).then_some((wo, wi, m, d))
+        // Half the sum of two unit vectors has the length of the cosine: the same from both ends, so that
+        // the value is reciprocal to the last digits also where both graze the surface.
+        (length > 0.0 && d > 0.0).then_some(HalfVector {
+            wo,
+            wi,
+            m,
+            d,
+            cos: (0.5 * length).min(1.0),
+        })
     }
 
     #[inline]
@@ -110,12 +132,12 @@ impl RoughConductor {
         // of two f32 directions has lost the shape of the lobe.
         let d = self.facets.d(m);
         let shadowing = self.facets.g1_over_cos(wi) * wi.z;
-        let (pdf, weight) = if self.facets.visible {
-            (0.25 * d * self.facets.g1_over_cos(front), shadowing)
+        let masking = self.facets.g1_over_cos(front);
+        let pdf = self.reflected_pdf(d, masking, m.z, cos);
+        let weight = if self.facets.visible {
+            shadowing
         } else {
-            let pdf = 0.25 * d * m.z / cos;
-            let masking = self.facets.g1_over_cos(front);
-            (pdf, shadowing * masking * cos / m.z)
+            shadowing * masking * cos / m.z
         };
         let weight = self.metal.fresnel(cos) * weight;
         let usable = pdf > 0.0 && pdf.is_finite() && !weight.is_black();

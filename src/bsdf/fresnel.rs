@@ -6,7 +6,7 @@ use crate::math::{Rgb, sqr};
 /// Reflectance of the boundary between two dielectrics, and the cosine of the refracted direction (0 under
 /// total internal reflection).
 ///
-/// `cos` in [0,1] is on the side the light comes from, `eta` = index beyond / index on that side, > 0.
+/// `cos` in 0..1 is on the side the light comes from, `eta` = index beyond / index on that side, > 0.
 /// Fresnel's equations (Born & Wolf, 1.5.2 (21)); with `g = eta cos_t` the differences in their numerators
 /// are `(1 - eta²) / (cos + g)` and its like, so they vanish exactly as `eta` tends to 1.
 #[inline]
@@ -29,7 +29,7 @@ pub fn dielectric(cos: f32, eta: f32) -> (f32, f32) {
 
 /// Reflectance of a conductor of complex index `eta + i k` relative to the medium outside, per channel.
 ///
-/// `cos` in [0,1]; `eta`, `k` >= 0. `eta` = 0 reflects everything, which is the material "none".
+/// `cos` in 0..1; `eta`, `k` >= 0. `eta` = 0 reflects everything, which is the material "none".
 /// Born & Wolf, section 14.2, in the real form of Lazányi & Szirmay-Kalos 2005.
 #[inline]
 pub fn conductor(cos: f32, eta: Rgb, k: Rgb) -> Rgb {

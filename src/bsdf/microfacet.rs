@@ -25,7 +25,7 @@ pub enum Shape {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Microfacet {
     pub shape: Shape,
-    /// Root mean square slope (times sqrt 2) along x and y for Beckmann, its like for GGX.
+    /// Roughness along x and y, in [`ALPHA_MIN`]..: for Beckmann the root mean square slope times sqrt 2.
     pub alpha: Vec2,
     /// Sample the normals visible from `wo`; else all of them, by D cos.
     pub visible: bool,
@@ -70,7 +70,9 @@ impl Microfacet {
     /// Smith's masking over the cosine, G1(w) / w.z, which stays finite at grazing angles.
     ///
     /// `w` of unit length, w.z > 0, and on the visible side of the facet (which holds in a reflection).
-    /// Walter et al. 2007, equation 34; for Beckmann the exact form (Heitz 2014, appendix A).
+    /// Walter et al. 2007, equation 34; for Beckmann the exact form (Heitz 2014, appendix A), so that visible
+    /// normals have exactly the density [`Microfacet::pdf`]. The rational fit that Walter et al. give, and
+    /// Mitsuba uses, differs by up to 0.31 % where `w.z` is below 1.6 of the spread of slopes along `w`.
     #[inline]
     pub fn g1_over_cos(&self, w: Vec3) -> f32 {
         let spread = stretch(w, self.alpha).truncate().length();
@@ -190,16 +192,23 @@ fn beckmann_slope(cos: f32, sin: f32, u: f32) -> f32 {
             b = 0.5 * (lo + hi);
         }
         x = erf_inv(b);
-        let excess = cos * (1.0 + b) + sin * FRAC_1_SQRT_PI * (-x * x).exp() - target;
-        if excess.abs() < 1e-6 * area {
-            break;
+        let gauss = (-x * x).exp();
+        let excess = cos * (1.0 + b) + sin * FRAC_1_SQRT_PI * gauss - target;
+        let step = excess / (cos - sin * x);
+        // The same step in x: when it is short it leaves an error of its square, so it is the last one.
+        let step_x = step / (2.0 * FRAC_1_SQRT_PI * gauss);
+        if step_x.abs() < 1e-3 {
+            return x - step_x;
+        }
+        if excess.abs() < 2.0 * f32::EPSILON * area {
+            break; // far out in the tail, where the sum resolves no more
         }
         if excess > 0.0 {
             hi = b;
         } else {
             lo = b;
         }
-        b -= excess / (cos - sin * x);
+        b -= step;
     }
     x
 }

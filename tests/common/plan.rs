@@ -159,7 +159,7 @@ impl Chi2Plan {
         let mut expected = vec![0.0; CELLS];
         let mut total = [0.0; 4];
         for (i, &(leaf, focus)) in tree.leaves.iter().enumerate() {
-            let m = quadrature::integrate(&density, leaf, focus, 2e-8, 0.5 / LEAVES as f64);
+            let m = quadrature::integrate(&density, leaf, focus, 1e-7, 0.4 / LEAVES as f64);
             expected[i * CELLS / LEAVES] += m[0];
             total = quadrature::add(total, m);
         }

@@ -83,7 +83,7 @@ pub fn integrate(
         sum
     };
     let sum = parts(0);
-    if sum[0] < least { parts(4) } else { sum }
+    if sum[0] < least { parts(2) } else { sum }
 }
 
 /// Positions from `lo` to `hi`, dense around the interval from `a` to `b`.

@@ -10,7 +10,7 @@ pub use spherical::{SphericalRectangle, SphericalTriangle};
 pub use tabulated::{AliasTable, Pick, Tabulated1, Tabulated2};
 
 use super::{PI, Vec2, Vec3, safe_sqrt};
-use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, FRAC_PI_4};
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_4};
 
 /// Density of [`concentric_disk`] per unit of area.
 pub const DISK_PDF: f32 = FRAC_1_PI;
@@ -28,15 +28,26 @@ pub const TRIANGLE_PDF: f32 = 2.0;
 pub fn concentric_disk(u: Vec2) -> Vec2 {
     let p = 2.0 * u - Vec2::ONE;
     // Each of the four wedges of the square: the radius is its longer coordinate, the angle the ratio.
-    let (r, phi) = if p.x.abs() > p.y.abs() {
-        (p.x, FRAC_PI_4 * (p.y / p.x))
+    if p.x.abs() > p.y.abs() {
+        let (sin, cos) = sin_cos_eighth(FRAC_PI_4 * (p.y / p.x));
+        p.x * Vec2::new(cos, sin)
     } else if p.y != 0.0 {
-        (p.y, FRAC_PI_2 - FRAC_PI_4 * (p.x / p.y))
+        let (sin, cos) = sin_cos_eighth(FRAC_PI_4 * (p.x / p.y));
+        p.y * Vec2::new(sin, cos)
     } else {
-        return Vec2::ZERO;
-    };
-    let (sin, cos) = phi.sin_cos();
-    r * Vec2::new(cos, sin)
+        Vec2::ZERO
+    }
+}
+
+/// Sine and cosine of an angle of at most pi/4, to 1e-7 (polynomials of Moshier's Cephes library). Several
+/// times faster than the general functions, which reduce the angle first; this is in every bounce.
+#[inline]
+fn sin_cos_eighth(x: f32) -> (f32, f32) {
+    let x2 = x * x;
+    let sin = x + x * x2 * (-0.166_666_55 + x2 * (8.332_161e-3 - x2 * 1.951_529_6e-4));
+    let cos =
+        1.0 - 0.5 * x2 + x2 * x2 * (4.166_664_6e-2 + x2 * (-1.388_731_6e-3 + x2 * 2.443_315_7e-5));
+    (sin, cos)
 }
 
 /// A direction of the upper hemisphere (z = normal) with density [`cosine_hemisphere_pdf`].
@@ -88,7 +99,7 @@ pub fn uniform_cone_pdf(h_max: f32) -> f32 {
     1.0 / (2.0 * PI * h_max)
 }
 
-/// `1 - cos` of an angle of at most a right angle from its squared sine in [0,1], without cancellation.
+/// `1 - cos` of an angle of at most a right angle from its squared sine in 0..1, without cancellation.
 #[inline]
 pub fn cap_height(sin2: f32) -> f32 {
     sin2 / (1.0 + safe_sqrt(1.0 - sin2))
@@ -106,5 +117,20 @@ pub fn triangle(u: Vec2) -> Vec2 {
     } else {
         let b2 = 0.5 * u.y;
         Vec2::new(u.x - b2, b2)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn short_sine_and_cosine_are_right() {
+        for i in -1000..=1000 {
+            let x = FRAC_PI_4 * i as f32 / 1000.0;
+            let (sin, cos) = sin_cos_eighth(x);
+            let (s, c) = f64::from(x).sin_cos();
+            assert!((f64::from(sin) - s).abs() < 1e-7 && (f64::from(cos) - c).abs() < 1e-7);
+        }
     }
 }

@@ -49,7 +49,7 @@ pub struct SphericalRectangle {
 }
 
 impl SphericalRectangle {
-    /// The rectangle `corner + s ex + t ey` with s, t in [0,1] and `ex` at right angles to `ey`, seen from
+    /// The rectangle `corner + s ex + t ey` with s, t in 0..1 and `ex` at right angles to `ey`, seen from
     /// `eye`. `None` when it has no area or is seen edge on.
     pub fn new(corner: Vec3, ex: Vec3, ey: Vec3, eye: Vec3) -> Option<SphericalRectangle> {
         let (ex, ey) = (ex.as_dvec3(), ey.as_dvec3());
@@ -95,7 +95,7 @@ impl SphericalRectangle {
         self.solid_angle as f32
     }
 
-    /// The parameters (s, t) in [0,1]² of a point, with density [`SphericalRectangle::pdf`].
+    /// The parameters (s, t) in `[0,1]²` of a point, with density [`SphericalRectangle::pdf`].
     pub fn sample(&self, u: Vec2) -> Vec2 {
         if self.solid_angle < TINY {
             return u;
