@@ -1,7 +1,7 @@
 //! Checks an object of a description against the table of plugins.
 
 use super::desc::{Child, Given, Object, Value};
-use super::error::{Place, SceneError, Span, did_you_mean, list};
+use super::error::{Place, SceneError, Span, did_you_mean, list, shown_number};
 use super::plugins::{self, Category, Default, Kind, MEDIA, Param, Plugin, Role, named_ior};
 use super::props::{float_of, is_parameter, missing_parameter};
 use super::spectrum::Spectrum;
@@ -36,7 +36,7 @@ pub fn params(
     plugin: &'static Plugin,
     params: &mut [Given],
     place: &dyn Fn(Span) -> Place,
-    find: &dyn Fn(&str) -> Result<PathBuf, String>,
+    find: &dyn Fn(&str) -> Result<PathBuf, Wrong>,
 ) -> Result<(), SceneError> {
     for i in 0..params.len() {
         let (before, rest) = params.split_at_mut(i);
@@ -55,7 +55,7 @@ pub fn params(
         }
         let wrong = |what: String| SceneError::new(place(given.value_at), what);
         if let (Kind::File, Value::Text(name)) = (param.kind, &given.value) {
-            let path = find(name).map_err(wrong)?;
+            let path = find(name).map_err(|(what, help)| wrong(what).with_help_opt(help))?;
             given.value = Value::File(path);
         } else if let Err((what, help)) = value(plugin, param, &given.value) {
             return Err(wrong(what).with_help_opt(help));
@@ -85,7 +85,8 @@ pub fn children(
             let category = objects[c.object.index()].plugin.category;
             category == kind.category && !is_parameter(plugin, category, c.name.as_deref())
         };
-        if before.iter().filter(same).count() >= slot.max {
+        // Counting only where it is limited keeps a scene of many shapes linear.
+        if slot.max < usize::MAX && before.iter().filter(same).count() >= slot.max {
             let first = before.iter().find(same).map_or(child.at, |c| c.at);
             let count = if slot.max == 1 {
                 format!("one {}", kind.category)
@@ -93,9 +94,7 @@ pub fn children(
                 format!("{} {}s", slot.max, kind.category)
             };
             let what = format!(
-                "{} \"{}\" takes at most {count}; the first is at {}",
-                plugin.category,
-                plugin.name,
+                "{plugin} takes at most {count}; the first is at {}",
                 short(&place(first))
             );
             return Err(SceneError::new(place(child.at), what));
@@ -108,10 +107,7 @@ pub fn children(
             .filter(|c| objects[c.object.index()].plugin.category == slot.category)
             .count();
         if count < slot.min {
-            let what = format!(
-                "{} \"{}\" needs a <{}> inside",
-                plugin.category, plugin.name, slot.category
-            );
+            let what = format!("{plugin} needs a <{}> inside", slot.category);
             return Err(SceneError::new(place(object.at), what));
         }
     }
@@ -157,9 +153,7 @@ fn value(plugin: &Plugin, param: &Param, value: &Value) -> Result<(), Wrong> {
     let name = param.name;
     let mistyped = || {
         let what = format!(
-            "\"{name}\" of {} \"{}\" must be {}, not {}",
-            plugin.category,
-            plugin.name,
+            "\"{name}\" of {plugin} must be {}, not {}",
             param.kind.describe(),
             value.describe()
         );
@@ -178,12 +172,12 @@ fn value(plugin: &Plugin, param: &Param, value: &Value) -> Result<(), Wrong> {
         (Kind::Float(range), Value::Float(_) | Value::Int(_)) => {
             let x = float_of(value).unwrap_or_default();
             let good = range.contains(x);
-            good.then_some(()).ok_or_else(|| outside(x.to_string()))
+            good.then_some(()).ok_or_else(|| outside(shown_number(x)))
         }
         (Kind::FloatTexture(range), _) => {
             let x = float_of(value).ok_or_else(mistyped)?;
             let good = range.contains(x);
-            good.then_some(()).ok_or_else(|| outside(x.to_string()))
+            good.then_some(()).ok_or_else(|| outside(shown_number(x)))
         }
         (Kind::Bool, Value::Bool(_))
         | (Kind::Text, Value::Text(_))
@@ -198,7 +192,10 @@ fn value(plugin: &Plugin, param: &Param, value: &Value) -> Result<(), Wrong> {
         }
         (Kind::Ior, Value::Float(x)) if *x > 0.0 => Ok(()),
         (Kind::Ior, Value::Float(x)) => Err((
-            format!("\"{name}\" must be a number above 0, not {x}"),
+            format!(
+                "\"{name}\" must be a number above 0, not {}",
+                shown_number(*x)
+            ),
             None,
         )),
         (Kind::Ior, Value::Text(medium)) => named_ior(medium).map(|_| ()).ok_or_else(|| {
@@ -234,29 +231,26 @@ fn color(role: Role, value: &Value) -> Option<Result<(), String>> {
     Some(match value {
         Value::Rgb(rgb) => match rgb.iter().all(|&c| good(c)) {
             true => Ok(()),
-            false => Err(format!("{}, {}, {}", rgb[0], rgb[1], rgb[2])),
+            false => Err(rgb.map(shown_number).join(", ")),
         },
         Value::Float(_) | Value::Int(_) | Value::Spectrum(Spectrum::Uniform(_)) => {
             let x = float_of(value)?;
-            good(x).then_some(()).ok_or_else(|| x.to_string())
+            good(x).then_some(()).ok_or_else(|| shown_number(x))
         }
         // What a measured spectrum has above 1 is cut off with its colour.
         Value::Spectrum(Spectrum::Sampled(samples)) => match samples.iter().find(|s| s.1 < 0.0) {
             None => Ok(()),
-            Some((nm, x)) => Err(format!("{x} at {nm} nm")),
+            Some((nm, x)) => Err(format!("{} at {nm} nm", shown_number(*x))),
         },
         _ => return None,
     })
 }
 
 fn unknown(plugin: &Plugin, name: &str, at: Place) -> SceneError {
-    let what = format!(
-        "unknown parameter \"{name}\" of {} \"{}\"",
-        plugin.category, plugin.name
-    );
+    let what = format!("unknown parameter \"{name}\" of {plugin}");
     let names = || plugin.params.iter().map(|p| p.name);
     let help = did_you_mean(name, names()).unwrap_or_else(|| match plugin.params {
-        [] => format!("{} \"{}\" has no parameters", plugin.category, plugin.name),
+        [] => format!("{plugin} has no parameters"),
         _ => format!("known are {}", list(names())),
     });
     SceneError::new(at, what).with_help(help)
@@ -273,16 +267,10 @@ fn unwanted(
         if plugin.param(name).is_none() {
             return unknown(plugin, name, place(child.at));
         }
-        let what = format!(
-            "\"{name}\" of {} \"{}\" cannot be a texture",
-            plugin.category, plugin.name
-        );
+        let what = format!("\"{name}\" of {plugin} cannot be a texture");
         return SceneError::new(place(child.at), what);
     }
-    let what = format!(
-        "a <{category}> has no place in {} \"{}\"",
-        plugin.category, plugin.name
-    );
+    let what = format!("a <{category}> has no place in {plugin}");
     let textured: Vec<_> = plugin
         .params
         .iter()
@@ -328,9 +316,7 @@ fn clash_text(
     place: &dyn Fn(Span) -> Place,
 ) -> String {
     format!(
-        "{} \"{}\" takes either \"{first}\" or \"{second}\", not both; \"{first}\" is at {}",
-        plugin.category,
-        plugin.name,
+        "{plugin} takes either \"{first}\" or \"{second}\", not both; \"{first}\" is at {}",
         short(&place(first_at))
     )
 }

@@ -161,21 +161,18 @@ impl SceneDesc {
     /// Definitions at the top of the scene that nothing refers to are no errors.
     pub fn check_all_read(&self) -> Result<(), SceneError> {
         for object in self.objects.iter().filter(|o| o.visited.is_set()) {
-            let owner = (object.plugin.category, object.plugin.name);
+            let owner = object.plugin;
             if let Some(unread) = object.params.iter().find(|p| !p.read.is_set()) {
                 let what = format!(
-                    "parameter \"{}\" of {} \"{}\" has no effect here",
-                    unread.name, owner.0, owner.1
+                    "parameter \"{}\" of {owner} has no effect here",
+                    unread.name
                 );
                 return Err(SceneError::new(self.place(unread.name_at), what));
             }
-            let unread = |c: &&Child| !c.read.is_set() && !self.is_definition(owner.0, c);
+            let unread = |c: &&Child| !c.read.is_set() && !self.is_definition(owner.category, c);
             if let Some(unread) = object.children.iter().find(unread) {
                 let child = self.objects[unread.object.index()].plugin;
-                let what = format!(
-                    "{} \"{}\" in {} \"{}\" has no effect here",
-                    child.category, child.name, owner.0, owner.1
-                );
+                let what = format!("{child} in {owner} has no effect here");
                 return Err(SceneError::new(self.place(unread.at), what));
             }
         }

@@ -183,6 +183,14 @@ fn edit_distance(a: &str, b: &str) -> usize {
     last[b.len()]
 }
 
+/// A number as a reader would write it, also when it is very large or small.
+pub fn shown_number(x: f64) -> String {
+    match x.abs() {
+        1e-5..1e9 | 0.0 => x.to_string(),
+        _ => format!("{x:e}"),
+    }
+}
+
 /// `"a", "b" and "c"`, for lists in messages.
 pub fn list(names: impl IntoIterator<Item = impl AsRef<str>>) -> String {
     let mut names: Vec<String> = names

@@ -12,8 +12,8 @@ pub const XML_NESTING: usize = 64;
 pub const INCLUDE_DEPTH: usize = 15;
 /// Includes of one scene, counting each time.
 pub const INCLUDES: usize = 10_000;
-/// Length of one attribute after its parameters are filled in.
-pub const ATTRIBUTE_BYTES: usize = 16 << 20;
+/// Bytes that `$name` may be replaced by, over the whole scene.
+pub const FILLED_IN_BYTES: usize = 64 << 20;
 /// Side of an image.
 pub const IMAGE_SIDE: i64 = 65_536;
 /// Bytes of one mesh file.

@@ -257,11 +257,8 @@ impl<'a> Props<'a> {
             Some(RgbOrTexture::Rgb(rgb)) => Ok(Some(rgb)),
             None => Ok(None),
             Some(RgbOrTexture::Texture(_)) => {
-                let (category, plugin) = (self.category(), self.plugin());
-                Err(self.error_at(
-                    name,
-                    format!("\"{name}\" of {category} \"{plugin}\" cannot be a texture"),
-                ))
+                let plugin = self.row();
+                Err(self.error_at(name, format!("\"{name}\" of {plugin} cannot be a texture")))
             }
         }
     }
@@ -327,10 +324,8 @@ impl<'a> Props<'a> {
 
     fn lookup(&self, name: &str) -> Result<(&'static Param, Option<&'a Given>), SceneError> {
         let param = self.object().plugin.param(name).ok_or_else(|| {
-            let (category, plugin) = (self.category(), self.plugin());
-            self.error(format!(
-                "{category} \"{plugin}\" has no parameter \"{name}\""
-            ))
+            let plugin = self.row();
+            self.error(format!("{plugin} has no parameter \"{name}\""))
         })?;
         let given = self.given(name);
         if let Some(given) = given {
@@ -350,10 +345,7 @@ impl<'a> Props<'a> {
 
 /// The error for a required parameter that is not there.
 pub(super) fn missing_parameter(plugin: &Plugin, name: &str, at: Place) -> SceneError {
-    let what = format!(
-        "{} \"{}\" needs the parameter \"{name}\"",
-        plugin.category, plugin.name
-    );
+    let what = format!("{plugin} needs the parameter \"{name}\"");
     let help = plugin.param(name).map(|p| {
         let tag = p.kind.tag();
         format!("add <{tag} name=\"{name}\" .../>: {}", p.doc)

@@ -1,27 +1,149 @@
-//! Temporary.
+//! Readers of mesh files: Wavefront OBJ and PLY, into plain arrays.
+//!
+//! Positions stay in f64, since the scene is moved to its centre only later. What is wrong with a
+//! file is told with its name and, for text, its line. Nothing is allocated on the word of a header
+//! alone: declared counts are held against the bytes that are there.
+
+mod normals;
+mod obj;
+mod ply;
+
+use super::error::SceneError;
+use super::limits;
+use super::props::Props;
 use crate::math::{DVec3, Vec2, Vec3};
-use std::path::Path;
+use std::fmt;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// A triangle mesh as a file gives it, polygons cut into fans. Never empty, all numbers finite, all
+/// indices in range; triangles may still be degenerate.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshData {
     pub positions: Vec<DVec3>,
+    /// Per vertex, of any length; a zero vector where the file has none.
     pub normals: Option<Vec<Vec3>>,
+    /// Per vertex.
     pub uvs: Option<Vec<Vec2>>,
     pub indices: Vec<[u32; 3]>,
 }
-pub fn read_ply(_: &Path, _: bool) -> Result<MeshData, String> {
-    Err("ply".into())
+
+/// What is wrong with a mesh file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MeshError {
+    pub file: PathBuf,
+    /// From 1; `None` where the file has no lines or the error none.
+    pub line: Option<usize>,
+    pub what: String,
 }
-pub fn read_obj(path: &Path, flip: bool) -> Result<MeshData, String> {
-    let (models, _) = tobj::load_obj(path, &tobj::LoadOptions { single_index: true, triangulate: true, ..Default::default() }).map_err(|e| e.to_string())?;
-    let mut d = MeshData { positions: vec![], normals: Some(vec![]), uvs: Some(vec![]), indices: vec![] };
-    for m in models {
-        let m = m.mesh;
-        let o = d.positions.len() as u32;
-        d.positions.extend(m.positions.chunks(3).map(|p| DVec3::new(p[0], p[1], p[2])));
-        if let Some(n) = &mut d.normals { n.extend(m.normals.chunks(3).map(|p| Vec3::new(p[0] as f32, p[1] as f32, p[2] as f32))); }
-        if let Some(n) = &mut d.uvs { n.extend(m.texcoords.chunks(2).map(|p| Vec2::new(p[0] as f32, if flip { 1.0 - p[1] as f32 } else { p[1] as f32 }))); }
-        d.indices.extend(m.indices.chunks(3).map(|i| [i[0] + o, i[1] + o, i[2] + o]));
+
+impl fmt::Display for MeshError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:", self.file.display())?;
+        if let Some(line) = self.line {
+            write!(f, "{line}:")?;
+        }
+        write!(f, " {}", self.what)
     }
-    if d.normals.as_ref().unwrap().is_empty() { d.normals = None; }
-    if d.uvs.as_ref().unwrap().is_empty() { d.uvs = None; }
-    Ok(d)
+}
+
+impl std::error::Error for MeshError {}
+
+/// A message and the line it is about.
+type Wrong = (Option<usize>, String);
+
+/// The mesh of an `obj` or `ply` shape, with `face_normals` and `flip_tex_coords` applied: normals
+/// are `None` for face normals, else complete and of unit length (computed where the file has none).
+/// `flip_normals` and `to_world` are left to the caller.
+pub fn read(shape: &Props<'_>) -> Result<MeshData, SceneError> {
+    let path = shape.file("filename")?;
+    let face_normals = shape.bool("face_normals")?;
+    let flip = shape.bool("flip_tex_coords")?;
+    let mesh = match shape.plugin() {
+        "obj" => read_obj(path),
+        _ => read_ply(path),
+    };
+    let mut mesh = mesh.map_err(|error| shape.error_at("filename", error.to_string()))?;
+    if face_normals {
+        mesh.normals = None;
+    } else {
+        mesh.complete_normals();
+    }
+    if flip {
+        for uv in mesh.uvs.iter_mut().flatten() {
+            uv.y = 1.0 - uv.y;
+        }
+    }
+    Ok(mesh)
+}
+
+/// Reads a Wavefront OBJ file: `v`, `vt`, `vn`, `f`; other lines are skipped.
+pub fn read_obj(path: &Path) -> Result<MeshData, MeshError> {
+    read_with(path, |bytes| obj::parse(&bytes))
+}
+
+/// Reads a PLY file, ASCII or binary of either byte order.
+pub fn read_ply(path: &Path) -> Result<MeshData, MeshError> {
+    read_with(path, |bytes| ply::parse(&bytes))
+}
+
+fn read_with(
+    path: &Path,
+    parse: impl FnOnce(Vec<u8>) -> Result<MeshData, Wrong>,
+) -> Result<MeshData, MeshError> {
+    let error = |line, what| MeshError {
+        file: path.to_path_buf(),
+        line,
+        what,
+    };
+    let bytes = read_bytes(path).map_err(|what| error(None, what))?;
+    let mesh = parse(bytes).map_err(|(line, what)| error(line, what))?;
+    if mesh.indices.is_empty() {
+        return Err(error(None, "the mesh has no triangles".into()));
+    }
+    Ok(mesh)
+}
+
+fn read_bytes(path: &Path) -> Result<Vec<u8>, String> {
+    let failed = |error: std::io::Error| match error.kind() {
+        std::io::ErrorKind::NotFound => "no such file".to_string(),
+        _ => format!("cannot read it: {error}"),
+    };
+    let file = std::fs::File::open(path).map_err(failed)?;
+    let size = file.metadata().map_err(failed)?.len();
+    if size > limits::MESH_FILE_BYTES {
+        let gib = limits::MESH_FILE_BYTES >> 30;
+        return Err(format!("it is larger than {gib} GiB"));
+    }
+    let mut bytes = Vec::with_capacity(size as usize);
+    // What is no regular file may hold more than it says.
+    file.take(limits::MESH_FILE_BYTES)
+        .read_to_end(&mut bytes)
+        .map_err(failed)?;
+    Ok(bytes)
+}
+
+/// Appends the triangles (0, 1, 2), (0, 2, 3), ... of a polygon.
+fn push_fan(indices: &mut Vec<[u32; 3]>, polygon: &[u32]) {
+    if let [first, rest @ ..] = polygon {
+        indices.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]]));
+    }
+}
+
+/// A number of a text file, which must be finite also as the f32 it becomes, where it becomes one.
+fn number(word: &[u8]) -> Result<f64, String> {
+    let text = std::str::from_utf8(word).unwrap_or("?");
+    match text.parse::<f64>() {
+        Ok(x) if x.is_finite() => Ok(x),
+        Ok(_) => Err(format!("\"{text}\" is not a finite number")),
+        Err(_) => Err(format!("\"{}\" is not a number", shown(word))),
+    }
+}
+
+/// Bytes of a file for a message: short and printable.
+fn shown(word: &[u8]) -> String {
+    String::from_utf8_lossy(&word[..word.len().min(40)])
+        .chars()
+        .map(|c| if c.is_control() { '?' } else { c })
+        .collect()
 }

@@ -162,13 +162,15 @@ impl Kind {
     /// The type as a reader of messages and of the reference knows it.
     pub fn describe(self) -> String {
         match self {
-            Kind::Int(i64::MIN, i64::MAX) => "an integer".into(),
-            Kind::Int(low, i64::MAX) => format!("an integer of at least {low}"),
+            // What stands for "no limit".
+            Kind::Int(low, high) if high >= i64::from(i32::MAX) => {
+                format!("an integer of at least {low}")
+            }
             Kind::Int(low, high) => format!("an integer from {low} to {high}"),
             Kind::Float(range) => range.to_string(),
             Kind::Bool => "true or false".into(),
             Kind::Text => "a string".into(),
-            Kind::Choice(words) => format!("one of {}", super::error::list(words)),
+            Kind::Choice(words) => format!("one of \"{}\"", words.join("\", \"")),
             Kind::File => "the name of a file".into(),
             Kind::Point => "a point".into(),
             Kind::Vector => "a vector".into(),
@@ -383,6 +385,16 @@ impl Plugin {
 
     pub fn slot(&self, category: Category) -> Option<&'static Slot> {
         self.slots.iter().find(|s| s.category == category)
+    }
+}
+
+/// As messages name it: `bsdf "diffuse"`.
+impl fmt::Display for Plugin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.category {
+            Category::Scene => write!(f, "the scene"),
+            category => write!(f, "{category} \"{}\"", self.name),
+        }
     }
 }
 

@@ -2,9 +2,10 @@
 //! for files.
 
 use super::super::desc::place;
-use super::super::error::{Place, SceneError, Span, did_you_mean};
+use super::super::error::{Place, SceneError, Span, did_you_mean, list};
 use super::super::plugins::Category;
 use super::loader::{File, Loader};
+use super::values::Wrong;
 use super::{help_among, upgrade, values};
 use roxmltree::Node;
 use std::path::{Path, PathBuf};
@@ -41,12 +42,29 @@ impl Loader {
             .map(move |folder| folder.join(name))
     }
 
-    pub(super) fn find_file(&self, name: &str, folder: &Path) -> Result<PathBuf, String> {
+    pub(super) fn find_file(&self, name: &str, folder: &Path) -> Result<PathBuf, Wrong> {
         if name.is_empty() {
-            return Err("the name of the file is empty".into());
+            return Err(("the name of the file is empty".into(), None));
         }
         let found = self.candidates(name, folder).find(|path| path.is_file());
-        found.ok_or_else(|| format!("no file \"{name}\""))
+        found.ok_or_else(|| {
+            let mut folders: Vec<String> = Vec::new();
+            for folder in self.candidates("", folder) {
+                let shown = match folder.as_os_str().is_empty() {
+                    true => ".".to_string(),
+                    false => folder.display().to_string(),
+                };
+                let shown = match shown.trim_end_matches('/') {
+                    "" => shown,
+                    trimmed => trimmed.to_string(),
+                };
+                if !folders.contains(&shown) {
+                    folders.push(shown);
+                }
+            }
+            let help = format!("looked in {}", list(folders));
+            (format!("no file \"{name}\""), Some(help))
+        })
     }
 
     pub(super) fn attribute(

@@ -61,7 +61,7 @@ impl Loader {
         let failed = |what: String| self.error(name.at, format!("\"{}\": {what}", name.text));
         let path = self
             .find_file(&name.text, file.folder)
-            .map_err(|what| self.error(name.at, what))?;
+            .map_err(|wrong| self.wrong(name.at, wrong))?;
         let text = read_text(&path).map_err(failed)?;
         values::spectrum_file(&text)
             .map(Value::Spectrum)

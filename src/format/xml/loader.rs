@@ -304,7 +304,7 @@ impl Loader {
             |what: String| self.error(name.at, format!("cannot include \"{}\": {what}", name.text));
         let path = self
             .find_file(&name.text, file.folder)
-            .map_err(|_| failed("no such file".into()))?;
+            .map_err(|wrong| self.wrong(name.at, wrong))?;
         let text = read_text(&path).map_err(failed)?;
         if self.bytes + text.len() as u64 > limits::XML_TOTAL_BYTES {
             let mib = limits::XML_TOTAL_BYTES >> 20;

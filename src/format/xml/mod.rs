@@ -66,11 +66,8 @@ pub(super) fn parse(source: &Source) -> Result<Document<'_>, SceneError> {
         ),
         error => {
             let at = error.pos();
-            let text = error.to_string();
             // The position is told by the place.
-            let what = text
-                .rsplit_once(" at ")
-                .map_or(text.as_str(), |(what, _)| what);
+            let what = error.to_string().replacen(&format!(" at {at}"), "", 1);
             SceneError::new(source.place_at(at.row, at.col), format!("not XML: {what}"))
         }
     })

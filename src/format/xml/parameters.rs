@@ -3,11 +3,14 @@
 use super::super::error::{Place, SceneError, did_you_mean, list};
 use super::super::limits;
 use std::collections::BTreeMap;
+use std::ops::Bound;
 
 /// The parameters of a scene, by name.
 #[derive(Debug, Default)]
 pub struct Parameters {
     values: BTreeMap<String, Parameter>,
+    /// Bytes of all text that was filled in.
+    filled_in: usize,
 }
 
 #[derive(Debug)]
@@ -41,7 +44,10 @@ impl Parameters {
                 ));
             }
         }
-        Ok(Parameters { values })
+        Ok(Parameters {
+            values,
+            filled_in: 0,
+        })
     }
 
     /// A `<default>`: the first value given to a name stays, that of the command line before all.
@@ -65,26 +71,45 @@ impl Parameters {
         while let Some(dollar) = rest.find('$') {
             out.push_str(&rest[..dollar]);
             rest = &rest[dollar + 1..];
-            let known = self
-                .values
-                .iter_mut()
-                .filter(|(name, _)| rest.starts_with(name.as_str()))
-                .max_by_key(|(name, _)| name.len());
-            let Some((name, parameter)) = known else {
+            let Some(name) = self.longest_name(rest) else {
                 return Err(self.undefined(rest));
+            };
+            rest = &rest[name.len()..];
+            let Some(parameter) = self.values.get_mut(&name) else {
+                continue;
             };
             parameter.used = true;
             out.push_str(&parameter.value);
-            rest = &rest[name.len()..];
-            if out.len() > limits::ATTRIBUTE_BYTES {
+            self.filled_in += parameter.value.len();
+            if self.filled_in > limits::FILLED_IN_BYTES {
                 return Err((
-                    "the attribute grows too long".into(),
-                    format!("at most {} MiB are allowed", limits::ATTRIBUTE_BYTES >> 20),
+                    "the values of parameters grow too long".into(),
+                    format!(
+                        "at most {} MiB may be filled in, all together",
+                        limits::FILLED_IN_BYTES >> 20
+                    ),
                 ));
             }
         }
         out.push_str(rest);
         Ok(out)
+    }
+
+    /// The longest known name that `rest` begins with.
+    fn longest_name(&self, rest: &str) -> Option<String> {
+        // Names that begin `rest` sort before it; each miss shortens what the next may be.
+        let mut bound = rest;
+        loop {
+            let up_to = (Bound::Unbounded, Bound::Included(bound));
+            let (name, _) = self.values.range::<str, _>(up_to).next_back()?;
+            if rest.starts_with(name.as_str()) {
+                return Some(name.clone());
+            }
+            let same = |((i, a), b): &((usize, char), char)| (a == b).then_some(i + a.len_utf8());
+            let common = bound.char_indices().zip(name.chars());
+            let end = common.map_while(|pair| same(&pair)).last().unwrap_or(0);
+            bound = &bound[..end];
+        }
     }
 
     fn undefined(&self, rest: &str) -> (String, String) {
@@ -151,6 +176,9 @@ mod tests {
         p.set_default("a", "1");
         p.set_default("ab", "2");
         p.set_default("a", "3");
+        p.set_default("abz", "9");
+        p.set_default("ac", "9");
+        p.set_default("b", "9");
         assert_eq!(p.fill_in("x$a-$ab-b $abc$a.obj").unwrap(), "x1-2-b 2c1.obj");
         assert_eq!(p.fill_in("none").unwrap(), "none");
         assert_eq!(p.fill_in("$c").unwrap_err().0, "undefined parameter \"$c\"");

@@ -1,5 +1,6 @@
 //! The text of an attribute as number, colour, spectrum, vector or step of a transform.
 
+use super::super::error::shown_number;
 use super::super::spectrum::Spectrum;
 use crate::math::{DVec3, Frame, Transform, Vec3};
 
@@ -165,10 +166,8 @@ pub fn matrix(text: &str) -> Result<Transform, Wrong> {
 
 pub fn scale(factors: DVec3) -> Result<Transform, Wrong> {
     Transform::scale(factors).ok_or_else(|| {
-        let what = format!(
-            "scaling by ({}, {}, {}) is singular",
-            factors.x, factors.y, factors.z
-        );
+        let [x, y, z] = factors.to_array().map(shown_number);
+        let what = format!("scaling by ({x}, {y}, {z}) cannot be undone");
         wrong(what)
     })
 }
