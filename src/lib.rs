@@ -2,6 +2,7 @@
 #![deny(unsafe_code)]
 
 pub mod bsdf;
+pub mod cli;
 pub mod geom;
 pub mod image_io;
 pub mod math;
