@@ -1,6 +1,7 @@
 //! The command line. It turns arguments into edits of a job, shows progress and writes files; it decides
 //! nothing about rendering. Only this module and `main` print.
 
+pub mod compare;
 mod info;
 mod progress;
 mod render;
@@ -31,6 +32,7 @@ struct Cli {
 enum Command {
     /// Render a scene to an image, with an estimate of its error
     Render(Box<render::RenderArgs>),
+    Compare(Box<compare::CompareArgs>),
     /// Show what a scene contains and what is modelled for it, or what is supported at all
     Info(info::InfoArgs),
     /// Print a completion script for a shell
@@ -98,6 +100,13 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let line = args.iter().map(|a| a.to_string_lossy()).collect::<Vec<_>>().join(" ");
     let result = match &cli.command {
         Command::Render(args) => render::run(args, &line),
+        Command::Compare(args) => match compare::run(args) {
+            Ok(compare::Outcome::Passed) => Ok(Outcome::Done),
+            Ok(compare::Outcome::Failed) => Ok(Outcome::TestFailed),
+            Err(compare::Failure::Input(e)) => Err(Failure::Input(e.to_string())),
+            Err(compare::Failure::Usage(e)) => Err(Failure::Usage(e)),
+            Err(compare::Failure::Output(e)) => Err(e.into()),
+        },
         Command::Info(args) => info::run(args),
         Command::Completions { shell } => {
             clap_complete::generate(*shell, &mut Cli::command(), "luxel", &mut std::io::stdout());

@@ -89,17 +89,32 @@ impl Picture {
         let pixels = image.rgb().ok_or_else(|| CompareError::NoColour {
             path: path.to_path_buf(),
         })?;
+        Picture::finite(path, image.width, pixels)
+    }
+
+    /// The colours of layer `name` of the EXR at `path`, under the conditions of [`Picture::read`];
+    /// `Ok(None)` when it has no such layer.
+    pub fn read_layer(path: impl AsRef<Path>, name: &str) -> Result<Option<Picture>, CompareError> {
+        let path = path.as_ref();
+        let image = Image::read(path)?;
+        let layer = image.layer(name).and_then(|layer| layer.rgb());
+        layer
+            .map(|pixels| Picture::finite(path, image.width, pixels))
+            .transpose()
+    }
+
+    fn finite(path: &Path, width: usize, pixels: Vec<Rgb>) -> Result<Picture, CompareError> {
         let bad = |p: &Rgb| !p.is_finite();
         if let Some(at) = pixels.iter().position(bad) {
             return Err(CompareError::NotFinite {
                 path: path.to_path_buf(),
                 count: pixels.iter().filter(|p| bad(p)).count(),
-                first: [at % image.width, at / image.width],
+                first: [at % width, at / width],
             });
         }
         Ok(Picture {
-            width: image.width,
-            height: image.height,
+            width,
+            height: pixels.len() / width,
             pixels,
         })
     }

@@ -82,14 +82,19 @@ fn mesh(props: &Props, to_world: &Transform) -> Result<Kind, SceneError> {
     let flip_v = props.bool("flip_tex_coords")?;
     let face_normals = props.bool("face_normals")?;
     let data = match props.plugin() {
-        "ply" => mesh_io::read_ply(path, flip_v),
-        _ => mesh_io::read_obj(path, flip_v),
+        "ply" => mesh_io::read_ply(path),
+        _ => mesh_io::read_obj(path),
     };
     let mut data = data.map_err(|e| props.error_at("filename", e.to_string()))?;
     for p in &mut data.positions {
         *p = to_world.point(*p);
         if !p.is_finite() {
             return Err(props.error_at("to_world", "the transform takes a vertex to infinity"));
+        }
+    }
+    if flip_v {
+        for uv in data.uvs.iter_mut().flatten() {
+            uv.y = 1.0 - uv.y;
         }
     }
     if face_normals {
