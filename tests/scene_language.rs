@@ -45,7 +45,7 @@ fn defaults_come_from_the_table() {
     assert_eq!(film.int("width").unwrap(), 768);
     assert_eq!(film.opt_int("crop_width").unwrap(), None);
     assert_eq!(bsdfs[1].ior("int_ior").unwrap(), 1.5046);
-    assert_eq!(bsdfs[1].transform("int_ior").is_err(), true);
+    assert!(bsdfs[1].transform("int_ior").is_err());
 }
 
 #[test]
@@ -314,11 +314,10 @@ proptest! {
         let (ply_path, obj_path) = (dir.join("mutated.ply"), dir.join("mutated.obj"));
         fs::write(&ply_path, ply).unwrap();
         fs::write(&obj_path, obj).unwrap();
-        for read in [format::mesh_io::read_ply(&ply_path), format::mesh_io::read_obj(&obj_path)] {
-            if let Ok(mut mesh) = read {
-                mesh.complete_normals();
-                prop_assert!(mesh.normals.iter().flatten().all(|n| n.is_finite()));
-            }
+        let read = [format::mesh_io::read_ply(&ply_path), format::mesh_io::read_obj(&obj_path)];
+        for mut mesh in read.into_iter().flatten() {
+            mesh.complete_normals();
+            prop_assert!(mesh.normals.iter().flatten().all(|n| n.is_finite()));
         }
     }
 }
