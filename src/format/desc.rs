@@ -193,3 +193,9 @@ impl SceneDesc {
 pub(super) fn place(sources: &[Source], at: Span) -> Place {
     sources[at.source as usize].place(at.offset as usize)
 }
+
+/// Meshes are read by several threads from one description.
+const _: () = {
+    const fn shared_by_threads<T: Send + Sync>() {}
+    shared_by_threads::<SceneDesc>();
+};

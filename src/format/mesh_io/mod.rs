@@ -7,6 +7,7 @@
 mod normals;
 mod obj;
 mod ply;
+mod ply_header;
 
 use super::error::SceneError;
 use super::limits;

@@ -179,10 +179,7 @@ fn numbers<'a, const N: usize>(
 
 /// From an index that counts from 1, or back from the newest when negative.
 fn resolve(word: &[u8], count: usize, of: &str) -> Result<u32, String> {
-    let text = std::str::from_utf8(word).ok();
-    let index: i64 = text
-        .and_then(|t| t.parse().ok())
-        .ok_or_else(|| format!("\"{}\" is not an index", shown(word)))?;
+    let index = integer(word).ok_or_else(|| format!("\"{}\" is not an index", shown(word)))?;
     let from_zero = match index {
         1.. => index - 1,
         _ => index.saturating_add(count as i64),
@@ -194,6 +191,18 @@ fn resolve(word: &[u8], count: usize, of: &str) -> Result<u32, String> {
             "index {index} is out of range: there are {count} {of} so far"
         )),
     }
+}
+
+/// Decimal digits after an optional minus. Faces are most of a file, so this is on the hot path.
+fn integer(word: &[u8]) -> Option<i64> {
+    let (sign, digits) = match word {
+        [b'-', digits @ ..] => (-1, digits),
+        digits => (1, digits),
+    };
+    // 18 digits always fit.
+    let good = (1..=18).contains(&digits.len()) && digits.iter().all(u8::is_ascii_digit);
+    let value = |v: i64, d: &u8| v * 10 + i64::from(d - b'0');
+    good.then(|| sign * digits.iter().fold(0, value))
 }
 
 fn fits(count: usize) -> Result<(), String> {

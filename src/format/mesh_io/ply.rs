@@ -1,74 +1,18 @@
 //! PLY (the Stanford polygon format 1.0): ASCII, and binary in either byte order, any scalar types.
 
 use super::super::limits::POLYGON_CORNERS;
+use super::ply_header::{Element, Encoding, Header, Property, Scalar, header};
 use super::{MeshData, Wrong, number, push_fan, shown};
 use crate::math::{DVec3, Vec2, Vec3};
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Encoding {
-    Ascii,
-    Little,
-    Big,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Scalar {
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    F32,
-    F64,
-}
-
-#[derive(Debug)]
-struct Property {
-    name: String,
-    scalar: Scalar,
-    /// Type of the length, for a list.
-    length: Option<Scalar>,
-}
-
-#[derive(Debug)]
-struct Element {
-    name: String,
-    count: usize,
-    properties: Vec<Property>,
-}
-
-impl Scalar {
-    fn from_name(name: &str) -> Option<Scalar> {
-        Some(match name {
-            "char" | "int8" => Scalar::I8,
-            "uchar" | "uint8" => Scalar::U8,
-            "short" | "int16" => Scalar::I16,
-            "ushort" | "uint16" => Scalar::U16,
-            "int" | "int32" => Scalar::I32,
-            "uint" | "uint32" => Scalar::U32,
-            "float" | "float32" => Scalar::F32,
-            "double" | "float64" => Scalar::F64,
-            _ => return None,
-        })
-    }
-
-    fn size(self) -> usize {
-        match self {
-            Scalar::I8 | Scalar::U8 => 1,
-            Scalar::I16 | Scalar::U16 => 2,
-            Scalar::I32 | Scalar::U32 | Scalar::F32 => 4,
-            Scalar::F64 => 8,
-        }
-    }
-
-    fn is_integer(self) -> bool {
-        !matches!(self, Scalar::F32 | Scalar::F64)
-    }
-}
-
 pub fn parse(bytes: &[u8]) -> Result<MeshData, Wrong> {
-    let (encoding, elements, mut body) = header(bytes)?;
+    let Header {
+        encoding,
+        elements,
+        at,
+        line,
+    } = header(bytes)?;
+    let mut body = Body { bytes, at, line };
     let mut mesh = MeshData::default();
     for element in &elements {
         body.check_count(encoding, element)?;
@@ -94,83 +38,6 @@ pub fn parse(bytes: &[u8]) -> Result<MeshData, Wrong> {
         )),
         None => Ok(mesh),
     }
-}
-
-fn header(bytes: &[u8]) -> Result<(Encoding, Vec<Element>, Body<'_>), Wrong> {
-    let mut encoding = None;
-    let mut elements: Vec<Element> = Vec::new();
-    let mut at = 0;
-    for number in 1.. {
-        let wrong = |what: &str| (Some(number), what.to_string());
-        let rest = &bytes[at..];
-        let Some(end) = rest.iter().position(|&b| b == b'\n') else {
-            return Err(wrong(match number {
-                1 => "not a PLY file: the first line is not \"ply\"",
-                _ => "the header has no \"end_header\"",
-            }));
-        };
-        at += end + 1;
-        let line = std::str::from_utf8(&rest[..end]).map_err(|_| wrong("not text"))?;
-        let words: Vec<&str> = line.split_ascii_whitespace().collect();
-        match (number, words.as_slice()) {
-            (1, ["ply"]) => {}
-            (1, _) => return Err(wrong("not a PLY file: the first line is not \"ply\"")),
-            (_, [] | ["comment" | "obj_info", ..]) => {}
-            (_, ["format", name, "1.0"]) => {
-                encoding = Some(match *name {
-                    "ascii" => Encoding::Ascii,
-                    "binary_little_endian" => Encoding::Little,
-                    "binary_big_endian" => Encoding::Big,
-                    _ => return Err(wrong("unknown format")),
-                });
-            }
-            (_, ["element", name, count]) => elements.push(Element {
-                name: name.to_string(),
-                count: count
-                    .parse()
-                    .map_err(|_| wrong("the count of the element is no number"))?,
-                properties: Vec::new(),
-            }),
-            (_, ["property", kind @ ..]) => {
-                let element = elements
-                    .last_mut()
-                    .ok_or_else(|| wrong("a property before any element"))?;
-                let property = property(kind).ok_or_else(|| wrong("unknown kind of property"))?;
-                element.properties.push(property);
-            }
-            (_, ["end_header"]) => {
-                let encoding = encoding.ok_or_else(|| wrong("the header has no format"))?;
-                return Ok((
-                    encoding,
-                    elements,
-                    Body {
-                        bytes,
-                        at,
-                        line: number + 1,
-                    },
-                ));
-            }
-            _ => return Err(wrong("unknown line in the header")),
-        }
-    }
-    Err((None, "the header does not end".into()))
-}
-
-fn property(kind: &[&str]) -> Option<Property> {
-    let (length, scalar, name) = match kind {
-        ["list", length, scalar, name] => (Some(*length), *scalar, *name),
-        [scalar, name] => (None, *scalar, *name),
-        _ => return None,
-    };
-    let length = match length {
-        Some(length) => Some(Scalar::from_name(length).filter(|l| l.is_integer())?),
-        None => None,
-    };
-    Some(Property {
-        name: name.into(),
-        scalar: Scalar::from_name(scalar)?,
-        length,
-    })
 }
 
 /// What follows the header.

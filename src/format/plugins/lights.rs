@@ -47,10 +47,7 @@ pub const PLUGINS: &[Plugin] = &[
     emitter(
         "envmap",
         &[
-            Param::file(
-                "filename",
-                "The image: latitude by longitude, +y up, centre at -z.",
-            ),
+            Param::file("filename", "The image, latitude by longitude, with +y up."),
             Param::float(
                 "scale",
                 Range::NonNegative,
