@@ -1,6 +1,7 @@
 use super::*;
 use crate::math::fp;
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 use rand_pcg::Pcg32;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
@@ -152,7 +153,12 @@ impl Soup {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(300))]
+    #![proptest_config(ProptestConfig {
+        cases: 300,
+        rng_seed: RngSeed::Fixed(1),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
 
     /// Nearest hits and occlusion against the definition, over random soups of triangles and balls.
     #[test]
