@@ -249,6 +249,44 @@ fn the_z_test_passes_what_is_right_and_sees_one_percent() {
     }
 }
 
+/// Figures of an independent implementation in Python (numpy), which read the same pictures.
+#[test]
+fn the_z_test_agrees_with_another_implementation() {
+    // Share within the limit (%), the limit, largest and rms z; then error (%) and z of the scale
+    // tests and of the mean tests.
+    let pixels = [
+        [99.995, 4.79, 4.8, 1.12],
+        [99.045, 4.20, 5.6, 2.03],
+        [98.958, 4.20, 5.4, 2.02],
+    ];
+    let scales = [
+        [[1.023, 38.98], [0.998, 38.94], [0.986, 34.35]],
+        [[1.021, 38.24], [0.997, 38.37], [0.989, 31.55]],
+        [[1.022, 37.87], [0.997, 38.29], [0.986, 31.46]],
+    ];
+    let means = [
+        [[1.025, 38.67], [0.998, 37.70], [0.992, 33.27]],
+        [[1.018, 27.10], [0.998, 28.66], [0.996, 24.13]],
+        [[1.018, 27.10], [0.998, 28.66], [0.996, 24.13]],
+    ];
+    let near = |a: f64, b: f64, digit: f64| assert!((a - b).abs() <= 0.51 * digit, "{a} {b}");
+    for (i, (noise, reference, in_xyz)) in ways().into_iter().enumerate() {
+        let image = rendered(30, SPP, 1.01, in_xyz);
+        let found = z_test(&image, &reference, &noise, &Rule::default()).unwrap();
+        let [share, limit, largest, rms] = pixels[i];
+        near(100.0 * found.pixel.share, share, 1e-3);
+        near(found.pixel.z_limit, limit, 1e-2);
+        near(found.pixel.z_max, largest, 0.1);
+        near(found.pixel.z_rms, rms, 1e-2);
+        for (tests, figures) in [(found.scale, scales[i]), (found.mean, means[i])] {
+            for (test, [error, z]) in tests.iter().zip(figures) {
+                near(100.0 * test.error, error, 1e-3);
+                near(test.z, z, 1e-2);
+            }
+        }
+    }
+}
+
 /// An error in a small part of the picture that leaves scale and mean within their tolerance.
 #[test]
 fn the_pixel_test_sees_errors_in_places() {
@@ -258,7 +296,7 @@ fn the_pixel_test_sees_errors_in_places() {
             for x in 0..8 {
                 let factor = if x < 4 { 1.4 } else { 0.6 };
                 let pixel = &mut image.pixels[(20 + y) * WIDTH + 48 + x];
-                *pixel = *pixel * factor;
+                *pixel *= factor;
             }
         }
         let verdict = z_test(&image, &reference, &noise, &Rule::default()).unwrap();
