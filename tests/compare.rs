@@ -1,4 +1,7 @@
-//! Comparison figures against values computed once by other programs, and the command's verdicts.
+//! The Z-test on synthetic pictures of known noise, and the command that prints it.
+
+#[path = "common/pictures.rs"]
+mod pictures;
 
 use std::fs;
 use std::path::PathBuf;
@@ -8,118 +11,12 @@ use luxel::cli::compare::{self, CompareArgs, Failure, Outcome};
 use luxel::image_io::color::{RGB_TO_XYZ, XYZ_TO_RGB, apply};
 use luxel::image_io::{Image, Layer, Samples};
 use luxel::math::Rgb;
+use luxel::study::Picture;
 use luxel::study::z_test::{Noise, Rule, z_test};
-use luxel::study::{Picture, flip};
-
-/// A fixed mixing of 32 bits (Wellons' "lowbias32"): noise that other languages reproduce exactly.
-fn hash(x: u32) -> u32 {
-    let x = (x ^ (x >> 16)).wrapping_mul(0x7feb_352d);
-    let x = (x ^ (x >> 15)).wrapping_mul(0x846c_a68b);
-    x ^ (x >> 16)
-}
-
-/// Uniform in [0, 1), f64 as numpy computes it.
-fn noise(i: usize) -> f64 {
-    f64::from(hash(i as u32)) / 4_294_967_296.0
-}
-
-fn make(width: usize, height: usize, colour: impl Fn(usize, usize) -> [f64; 3]) -> Picture {
-    let pixel = |i: usize| Rgb::from_array(colour(i % width, i / width).map(|v| v as f32));
-    Picture {
-        width,
-        height,
-        pixels: (0..width * height).map(pixel).collect(),
-    }
-}
+use pictures::{make, noise};
 
 const WIDTH: usize = 96;
 const HEIGHT: usize = 64;
-
-fn pattern(x: usize, y: usize) -> [f64; 3] {
-    let check = ((x / 8 + y / 8) % 2) as f64 * 0.8;
-    [x as f64 / WIDTH as f64, y as f64 / HEIGHT as f64, check]
-}
-
-fn noise_at(x: usize, y: usize, c: usize) -> f64 {
-    noise((y * WIDTH + x) * 3 + c)
-}
-
-/// Pictures of `width x height` with a range of 8 stops, and the same times noise of 0.5 to 1.5. Left
-/// of column `black_until` the reference is black and the other a tenth as bright.
-fn ramp(width: usize, height: usize, black_until: usize) -> (Picture, Picture) {
-    let lit = |x: usize, y: usize| {
-        let gain = (x as f64 / WIDTH as f64 * 8.0 - 3.0).exp2();
-        pattern(x, y).map(|v| (f64::from(v as f32) * gain + 0.01) as f32)
-    };
-    let reference = |x: usize, y: usize| match x < black_until {
-        true => [0.0; 3],
-        false => lit(x, y).map(f64::from),
-    };
-    let noisy = |x: usize, y: usize| {
-        let gain = if x < black_until { 0.1f32 } else { 1.0 };
-        let lit = lit(x, y);
-        let c = |c: usize| (f64::from(lit[c]) * (0.5 + noise_at(x, y, c))) as f32 * gain;
-        [c(0), c(1), c(2)].map(f64::from)
-    };
-    (make(width, height, reference), make(width, height, noisy))
-}
-
-#[track_caller]
-fn close(a: f64, b: f64) {
-    assert!((a - b).abs() < 1e-4, "{a} is not {b}");
-}
-
-#[test]
-fn flip_agrees_with_the_authors_program() {
-    // Figures of flip-evaluator 1.7 for the same numbers.
-    let reference = make(WIDTH, HEIGHT, pattern);
-    let noisy = make(WIDTH, HEIGHT, |x, y| {
-        let base = pattern(x, y);
-        let c = |c: usize| {
-            (f64::from(base[c] as f32) + 0.3 * (noise_at(x, y, c) - 0.5)).clamp(0.0, 1.0)
-        };
-        [c(0), c(1), c(2)]
-    });
-    let ldr = flip::ldr(&noisy, &reference, flip::DEFAULT_PPD);
-    close(ldr.mean, 0.165_516);
-    close(ldr.map[10 * WIDTH + 20].into(), 0.300_923);
-    close(ldr.map[40 * WIDTH + 70].into(), 0.131_604);
-
-    let (reference, noisy) = ramp(WIDTH, HEIGHT, 0);
-    let hdr = flip::hdr(&noisy, &reference, flip::DEFAULT_PPD);
-    close(hdr.mean, 0.162_910);
-    close(hdr.map[10 * WIDTH + 20].into(), 0.223_614);
-    close(hdr.map[40 * WIDTH + 70].into(), 0.120_282);
-    // An odd number of pixels has another median.
-    let (reference, noisy) = ramp(95, 63, 0);
-    close(
-        flip::hdr(&noisy, &reference, flip::DEFAULT_PPD).mean,
-        0.162_905,
-    );
-    // Mostly black: the median has no exposure of its own.
-    let (reference, noisy) = ramp(WIDTH, HEIGHT, 60);
-    close(
-        flip::hdr(&noisy, &reference, flip::DEFAULT_PPD).mean,
-        0.697_800,
-    );
-}
-
-#[test]
-fn flip_of_small_and_constant_pictures() {
-    let grey = make(8, 8, |_, _| [0.5; 3]);
-    let dot = make(8, 8, |x, y| match (x, y) {
-        (4, 4) => [1.0, 0.0, 0.0],
-        _ => [0.5; 3],
-    });
-    let flip = flip::ldr(&dot, &grey, flip::DEFAULT_PPD);
-    close(flip.mean, 0.059_382);
-    close(flip.map[4 * 8 + 4].into(), 0.301_774);
-    close(flip.map[0].into(), 0.008_186);
-    assert_eq!(flip::hdr(&grey, &grey, flip::DEFAULT_PPD).mean, 0.0);
-    let black = make(8, 8, |_, _| [0.0; 3]);
-    let seen = flip::hdr(&grey, &black, flip::DEFAULT_PPD).mean;
-    assert!(seen > 0.5 && seen <= 1.0, "{seen}");
-}
 
 /// A standard normal number (Box and Muller 1958), from a stream of its own per `seed`.
 fn normal(seed: usize, i: usize) -> f64 {
@@ -249,6 +146,44 @@ fn the_z_test_passes_what_is_right_and_sees_one_percent() {
     }
 }
 
+/// Figures of an independent implementation in Python (numpy), which read the same pictures.
+#[test]
+fn the_z_test_agrees_with_another_implementation() {
+    // Share within the limit (%), the limit, largest and rms z; then error (%) and z of the scale
+    // tests and of the mean tests.
+    let pixels = [
+        [99.995, 4.79, 4.8, 1.12],
+        [99.045, 4.20, 5.6, 2.03],
+        [98.958, 4.20, 5.4, 2.02],
+    ];
+    let scales = [
+        [[1.023, 38.98], [0.998, 38.94], [0.986, 34.35]],
+        [[1.021, 38.24], [0.997, 38.37], [0.989, 31.55]],
+        [[1.022, 37.87], [0.997, 38.29], [0.986, 31.46]],
+    ];
+    let means = [
+        [[1.025, 38.67], [0.998, 37.70], [0.992, 33.27]],
+        [[1.018, 27.10], [0.998, 28.66], [0.996, 24.13]],
+        [[1.018, 27.10], [0.998, 28.66], [0.996, 24.13]],
+    ];
+    let near = |a: f64, b: f64, digit: f64| assert!((a - b).abs() <= 0.51 * digit, "{a} {b}");
+    for (i, (noise, reference, in_xyz)) in ways().into_iter().enumerate() {
+        let image = rendered(30, SPP, 1.01, in_xyz);
+        let found = z_test(&image, &reference, &noise, &Rule::default()).unwrap();
+        let [share, limit, largest, rms] = pixels[i];
+        near(100.0 * found.pixel.share, share, 1e-3);
+        near(found.pixel.z_limit, limit, 1e-2);
+        near(found.pixel.z_max, largest, 0.1);
+        near(found.pixel.z_rms, rms, 1e-2);
+        for (tests, figures) in [(found.scale, scales[i]), (found.mean, means[i])] {
+            for (test, [error, z]) in tests.iter().zip(figures) {
+                near(100.0 * test.error, error, 1e-3);
+                near(test.z, z, 1e-2);
+            }
+        }
+    }
+}
+
 /// An error in a small part of the picture that leaves scale and mean within their tolerance.
 #[test]
 fn the_pixel_test_sees_errors_in_places() {
@@ -258,7 +193,7 @@ fn the_pixel_test_sees_errors_in_places() {
             for x in 0..8 {
                 let factor = if x < 4 { 1.4 } else { 0.6 };
                 let pixel = &mut image.pixels[(20 + y) * WIDTH + 48 + x];
-                *pixel = *pixel * factor;
+                *pixel *= factor;
             }
         }
         let verdict = z_test(&image, &reference, &noise, &Rule::default()).unwrap();

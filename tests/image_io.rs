@@ -357,6 +357,121 @@ fn stored_kinds_of_pixels_are_kept() {
     assert_eq!((grey.channels, grey.pixels), (1, Pixels::U8(vec![200; 6])));
 }
 
+/// An EXR as other programs write it: 20 x 20 pixels, three kinds of samples, and any compression.
+fn foreign_exr(path: &Path, compression: exr::prelude::Compression, tiled: bool) {
+    use exr::prelude::*;
+    let ramp = |i: usize| i as f32 / 400.0;
+    let channel = |name: &str, samples| AnyChannel::new(name, samples);
+    let channels = SmallVec::from_vec(vec![
+        channel("R", FlatSamples::F32((0..400).map(ramp).collect())),
+        channel("G", FlatSamples::F16(vec![f16::from_f32(0.25); 400])),
+        channel("B", FlatSamples::F32(vec![0.5; 400])),
+        channel("id", FlatSamples::U32((0..400).collect())),
+    ]);
+    let encoding = exr::prelude::Encoding {
+        compression,
+        blocks: match tiled {
+            true => Blocks::Tiles(Vec2(8, 8)),
+            false => Blocks::ScanLines,
+        },
+        line_order: LineOrder::Increasing,
+    };
+    exr::prelude::Image::from_encoded_channels((20, 20), encoding, AnyChannels::sort(channels))
+        .write()
+        .to_file(path)
+        .unwrap();
+}
+
+#[test]
+fn exr_of_every_compression_is_read() {
+    use exr::prelude::Compression::*;
+    let folder = Folder::new("compressions");
+    let path = folder.file("a.exr");
+    // B44, PXR24 and DWA lose precision.
+    let kinds = [
+        (RLE, 0.0),
+        (ZIP1, 0.0),
+        (ZIP16, 0.0),
+        (PIZ, 0.0),
+        (PXR24, 1e-4),
+        (B44, 1e-4),
+        (DWAA(None), 0.05),
+        (DWAB(None), 0.05),
+    ];
+    for (compression, tolerance) in kinds {
+        for tiled in [false, true] {
+            foreign_exr(&path, compression, tiled);
+            let image = Image::read(&path).unwrap();
+            for (i, pixel) in image.rgb().unwrap().iter().enumerate() {
+                let expected = [i as f32 / 400.0, 0.25, 0.5];
+                for (a, b) in pixel.to_array().iter().zip(expected) {
+                    assert!((a - b).abs() <= tolerance, "{compression:?}: {a} {b}");
+                }
+            }
+            assert!(matches!(image.channel("id"), Some(Samples::Uint(v)) if v[399] == 399));
+        }
+    }
+}
+
+/// The decoder would ask for this much memory, and a refusal ends the process.
+#[test]
+fn sizes_inside_chunks_are_checked_too() {
+    let folder = Folder::new("dwa");
+    let path = folder.file("a.exr");
+    foreign_exr(&path, exr::prelude::Compression::DWAA(None), false);
+    let whole = fs::read(&path).unwrap();
+    // The one chunk ends the file: row, length, and eleven numbers of 8 bytes, the first of them 2.
+    let chunk = |at: &usize| {
+        let rest = (whole.len() - at) as u32;
+        whole[at - 4..*at] == rest.to_le_bytes() && whole[*at] == 2
+    };
+    let at = (4..whole.len()).find(chunk).unwrap();
+    for number in [1, 6, 7, 8, 9] {
+        let mut bytes = whole.clone();
+        bytes[at + 8 * number + 6] = 1;
+        fs::write(&path, &bytes).unwrap();
+        let told = message(Image::read(&path));
+        assert!(
+            told.ends_with("a chunk claims more data than it has pixels"),
+            "{told}"
+        );
+    }
+}
+
+#[test]
+fn parts_with_other_windows_are_seen_from_the_first() {
+    use exr::prelude::*;
+    let folder = Folder::new("windows");
+    let path = folder.file("a.exr");
+    let part = |name: &str, at: (i32, i32), size: (usize, usize), value: f32| {
+        let samples = FlatSamples::F32(vec![value; size.0 * size.1]);
+        let channels = AnyChannels::sort(SmallVec::from_vec(vec![AnyChannel::new("Y", samples)]));
+        let mut attributes = LayerAttributes::named(name);
+        attributes.layer_position = Vec2(at.0, at.1);
+        exr::prelude::Layer::new(
+            size,
+            attributes,
+            exr::prelude::Encoding::FAST_LOSSLESS,
+            channels,
+        )
+    };
+    let parts = vec![
+        part("beauty", (-1, 2), (3, 2), 1.0),
+        part("mask", (0, 3), (9, 9), 2.0),
+    ];
+    let frame = IntegerBounds::new((-4, -4), (20, 20));
+    exr::prelude::Image::from_layers(ImageAttributes::new(frame), parts)
+        .write()
+        .to_file(&path)
+        .unwrap();
+    let image = luxel::image_io::Image::read(&path).unwrap();
+    assert_eq!((image.width, image.height), (3, 2));
+    assert_eq!((image.offset, image.frame), ([3, 6], [20, 20]));
+    assert_eq!(image.channel("Y"), Some(&Samples::Float(vec![1.0; 6])));
+    let mask = vec![0.0, 0.0, 0.0, 0.0, 2.0, 2.0];
+    assert_eq!(image.channel("mask.Y"), Some(&Samples::Float(mask)));
+}
+
 #[test]
 fn declared_sizes_are_checked_before_memory_is_taken() {
     let folder = Folder::new("huge");

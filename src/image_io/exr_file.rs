@@ -14,7 +14,6 @@ use std::io::Cursor;
 use std::path::Path;
 
 use ::exr::error::Error as ExrError;
-use ::exr::meta::MetaData;
 use ::exr::meta::attribute::AttributeValue;
 use ::exr::meta::header::Header;
 use ::exr::prelude::{
@@ -24,17 +23,15 @@ use ::exr::prelude::{
 };
 use ::exr::prelude::{Image as ExrImage, SmallVec};
 
+use super::exr_check::checked_headers;
 use super::{Channel, Image, ImageError, Kind, Layer, Samples};
-use super::{MAX_SAMPLES, check_size, guarded, read_bytes};
+use super::{guarded, read_bytes};
 
 /// Name of the attribute that holds our metadata.
 const METADATA: &str = "luxel";
 
 /// Name of the first part in a file of several; they must all have one.
 const MAIN_PART: &str = "main";
-
-/// Largest coordinate of a data or display window that is accepted: far from integer overflow.
-const MAX_COORDINATE: i32 = 1 << 28;
 
 /// Files smaller than this are read by one thread: starting others takes longer.
 const PARALLEL_FROM: usize = 1 << 20;
@@ -63,51 +60,6 @@ fn metadata(headers: &[Header]) -> Option<String> {
         AttributeValue::Text(text) => Some(text.to_string()),
         _ => None,
     }
-}
-
-/// Reads the headers and refuses what the decoder cannot or must not handle.
-fn checked_headers(bytes: &[u8]) -> Result<Vec<Header>, String> {
-    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(told)?;
-    if meta.headers.is_empty() {
-        return Err("the file has no parts".to_string());
-    }
-    let mut samples = 0u64;
-    for header in &meta.headers {
-        if header.deep {
-            return Err("deep pixels are not supported".to_string());
-        }
-        let Vec2(width, height) = header.layer_size;
-        check_size(width as u64, height as u64)?;
-        let shared = &header.shared_attributes.display_window;
-        check_size(shared.size.0 as u64, shared.size.1 as u64)?;
-        let at = header.own_attributes.layer_position;
-        for coordinate in [at.0, at.1, shared.position.0, shared.position.1] {
-            if coordinate.unsigned_abs() > MAX_COORDINATE.unsigned_abs() {
-                return Err(format!("the picture lies at coordinate {coordinate}"));
-            }
-        }
-        for channel in &header.channels.list {
-            if channel.sampling != Vec2(1, 1) {
-                return Err(format!(
-                    "channel \"{}\" is stored at a lower resolution, which is not supported",
-                    channel.name
-                ));
-            }
-        }
-        samples += width as u64 * height as u64 * header.channels.list.len() as u64;
-        if samples > MAX_SAMPLES {
-            return Err(format!(
-                "the channels hold more than the {MAX_SAMPLES} samples that luxel accepts"
-            ));
-        }
-        // Each chunk has an entry of 8 bytes in a table of offsets: no table, no chunk, no memory.
-        if header.chunk_count as u64 > bytes.len() as u64 / 8 {
-            return Err(
-                "the file is cut off: it has fewer chunks than its header says".to_string(),
-            );
-        }
-    }
-    Ok(meta.headers.into_iter().collect())
 }
 
 pub(super) fn decode(bytes: &[u8]) -> Result<Image, String> {
@@ -330,7 +282,7 @@ fn ascii_json(json: &str) -> String {
     out
 }
 
-fn told(e: ExrError) -> String {
+pub(super) fn told(e: ExrError) -> String {
     match e {
         ExrError::NotSupported(what) => format!("this kind of EXR is not supported: {what}"),
         ExrError::Invalid(what) if what == "reference to missing bytes" => {

@@ -11,6 +11,7 @@
 mod atomic;
 mod bitmap;
 pub mod color;
+mod exr_check;
 mod exr_file;
 mod pfm;
 mod raster;
@@ -253,7 +254,8 @@ impl Image {
         check_size(self.width as u64, self.height as u64)?;
         let pixels = self.width * self.height;
         for layer in &self.layers {
-            for channel in layer.channels.iter().filter(|c| c.samples.len() != pixels) {
+            let wrong = |c: &&Channel| c.samples.len() != pixels;
+            if let Some(channel) = layer.channels.iter().find(wrong) {
                 return Err(format!(
                     "channel \"{}\" of layer \"{}\" has {} samples, not {} x {}",
                     channel.name,

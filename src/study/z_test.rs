@@ -111,8 +111,7 @@ pub struct Verdict {
 
 impl Verdict {
     pub fn pass(&self) -> bool {
-        let bias = self.scale.iter().chain(&self.mean);
-        self.pixel.pass && bias.fold(true, |all, t| all && t.pass)
+        self.pixel.pass && self.scale.iter().chain(&self.mean).all(|t| t.pass)
     }
 }
 
