@@ -10,12 +10,24 @@ use crate::texture::Texture;
 pub enum Material {
     /// The same everywhere: nothing to look up.
     Uniform(Bsdf),
-    Diffuse { reflectance: Texture },
+    Diffuse {
+        reflectance: Texture,
+    },
     Conductor(Metal),
-    RoughConductor { metal: Metal, roughness: Roughness },
-    Dielectric { eta: f32, reflectance: Texture, transmittance: Texture },
+    RoughConductor {
+        metal: Metal,
+        roughness: Roughness,
+    },
+    Dielectric {
+        eta: f32,
+        reflectance: Texture,
+        transmittance: Texture,
+    },
     /// One-sided materials for the front and the back, each as if its side were the front.
-    TwoSided { front: Box<Material>, back: Box<Material> },
+    TwoSided {
+        front: Box<Material>,
+        back: Box<Material>,
+    },
 }
 
 /// Textures of a metal's index of refraction and reflectance factor.
@@ -43,7 +55,11 @@ impl Material {
         match self {
             Material::Uniform(bsdf) => *bsdf,
             Material::TwoSided { front, back } => {
-                let side = if hit.wo.dot(hit.frame.n) < 0.0 { back } else { front };
+                let side = if hit.wo.dot(hit.frame.n) < 0.0 {
+                    back
+                } else {
+                    front
+                };
                 side.one_sided(hit.uv).two_sided()
             }
             one_sided => one_sided.one_sided(hit.uv),
@@ -55,10 +71,15 @@ impl Material {
             Material::Uniform(bsdf) => *bsdf,
             Material::Diffuse { reflectance } => Bsdf::Diffuse(Diffuse::new(reflectance.eval(uv))),
             Material::Conductor(metal) => Bsdf::Conductor(metal.at(uv)),
-            Material::RoughConductor { metal, roughness } => {
-                Bsdf::RoughConductor(RoughConductor { facets: roughness.at(uv), metal: metal.at(uv) })
-            }
-            Material::Dielectric { eta, reflectance, transmittance } => Bsdf::Dielectric(Dielectric {
+            Material::RoughConductor { metal, roughness } => Bsdf::RoughConductor(RoughConductor {
+                facets: roughness.at(uv),
+                metal: metal.at(uv),
+            }),
+            Material::Dielectric {
+                eta,
+                reflectance,
+                transmittance,
+            } => Bsdf::Dielectric(Dielectric {
                 reflectance: reflectance.eval(uv),
                 transmittance: transmittance.eval(uv),
                 ..Dielectric::new(*eta)
@@ -72,8 +93,13 @@ impl Material {
         if let Material::TwoSided { front, back } = self {
             let (front, back) = (front.folded(), back.folded());
             return match (&front, &back) {
-                (Material::Uniform(f), Material::Uniform(b)) if f == b => Material::Uniform(f.two_sided()),
-                _ => Material::TwoSided { front: Box::new(front), back: Box::new(back) },
+                (Material::Uniform(f), Material::Uniform(b)) if f == b => {
+                    Material::Uniform(f.two_sided())
+                }
+                _ => Material::TwoSided {
+                    front: Box::new(front),
+                    back: Box::new(back),
+                },
             };
         }
         match self.textures().iter().all(|t| t.as_constant().is_some()) {
@@ -88,23 +114,36 @@ impl Material {
             Material::Uniform(_) | Material::TwoSided { .. } => vec![],
             Material::Diffuse { reflectance } => vec![reflectance],
             Material::Conductor(m) => vec![&m.eta, &m.k, &m.reflectance],
-            Material::RoughConductor { metal: m, roughness: r } => {
+            Material::RoughConductor {
+                metal: m,
+                roughness: r,
+            } => {
                 vec![&m.eta, &m.k, &m.reflectance, &r.alpha_u, &r.alpha_v]
             }
-            Material::Dielectric { reflectance, transmittance, .. } => vec![reflectance, transmittance],
+            Material::Dielectric {
+                reflectance,
+                transmittance,
+                ..
+            } => vec![reflectance, transmittance],
         }
     }
 }
 
 impl Metal {
     fn at(&self, uv: Vec2) -> Conductor {
-        Conductor { reflectance: self.reflectance.eval(uv), ..Conductor::new(self.eta.eval(uv), self.k.eval(uv)) }
+        Conductor {
+            reflectance: self.reflectance.eval(uv),
+            ..Conductor::new(self.eta.eval(uv), self.k.eval(uv))
+        }
     }
 }
 
 impl Roughness {
     fn at(&self, uv: Vec2) -> Microfacet {
         let alpha = |t: &Texture| t.eval_scalar(uv);
-        Microfacet { visible: self.visible, ..Microfacet::new(self.shape, alpha(&self.alpha_u), alpha(&self.alpha_v)) }
+        Microfacet {
+            visible: self.visible,
+            ..Microfacet::new(self.shape, alpha(&self.alpha_u), alpha(&self.alpha_v))
+        }
     }
 }

@@ -72,7 +72,10 @@ pub enum Interpolation {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Texels {
     /// 8 bits per channel, sRGB-encoded when the flag is set, otherwise value / 255.
-    Bytes { data: Vec<[u8; 3]>, srgb: bool },
+    Bytes {
+        data: Vec<[u8; 3]>,
+        srgb: bool,
+    },
     Floats(Vec<[f32; 3]>),
 }
 
@@ -91,7 +94,11 @@ impl Picture {
         match &self.texels {
             Texels::Floats(data) => Rgb::from_array(data[i]),
             Texels::Bytes { data, srgb } => {
-                let decode: &[f32; 256] = if *srgb { &SRGB_TO_LINEAR } else { &BYTE_TO_UNIT };
+                let decode: &[f32; 256] = if *srgb {
+                    &SRGB_TO_LINEAR
+                } else {
+                    &BYTE_TO_UNIT
+                };
                 Rgb::from_array(data[i].map(|v| decode[v as usize]))
             }
         }
@@ -99,7 +106,9 @@ impl Picture {
 
     /// All texels, row by row from the top left, linear.
     pub fn colors(&self) -> Vec<Rgb> {
-        (0..self.height).flat_map(|y| (0..self.width).map(move |x| self.texel(x, y))).collect()
+        (0..self.height)
+            .flat_map(|y| (0..self.width).map(move |x| self.texel(x, y)))
+            .collect()
     }
 
     fn single_color(&self) -> Option<Rgb> {
@@ -148,7 +157,10 @@ impl Bitmap {
 
     #[inline]
     fn at(&self, x: i64, y: i64) -> Rgb {
-        self.texels.texel(wrap(self.wrap, x, self.texels.width), wrap(self.wrap, y, self.texels.height))
+        self.texels.texel(
+            wrap(self.wrap, x, self.texels.width),
+            wrap(self.wrap, y, self.texels.height),
+        )
     }
 }
 
@@ -178,7 +190,11 @@ impl Checkerboard {
     fn eval(&self, uv: Vec2) -> Rgb {
         let p = self.to_uv.transform_point2(uv);
         let p = p - p.floor();
-        if (p.x > 0.5) == (p.y > 0.5) { self.color0.eval(uv) } else { self.color1.eval(uv) }
+        if (p.x > 0.5) == (p.y > 0.5) {
+            self.color0.eval(uv)
+        } else {
+            self.color1.eval(uv)
+        }
     }
 }
 
@@ -188,9 +204,20 @@ mod tests {
 
     /// Red counts columns, green counts rows.
     fn ramp(interpolation: Interpolation, wrap: Wrap) -> Bitmap {
-        let data = (0..8).map(|i| [(i % 4) as f32, (i / 4) as f32, 1.0]).collect();
-        let texels = Arc::new(Picture { width: 4, height: 2, texels: Texels::Floats(data) });
-        Bitmap { texels, interpolation, wrap, to_uv: Affine2::IDENTITY }
+        let data = (0..8)
+            .map(|i| [(i % 4) as f32, (i / 4) as f32, 1.0])
+            .collect();
+        let texels = Arc::new(Picture {
+            width: 4,
+            height: 2,
+            texels: Texels::Floats(data),
+        });
+        Bitmap {
+            texels,
+            interpolation,
+            wrap,
+            to_uv: Affine2::IDENTITY,
+        }
     }
 
     #[test]
@@ -199,11 +226,51 @@ mod tests {
         use Wrap::*;
         // Red and green at (u, v), measured with Mitsuba 3.9.1 on the same ramp.
         let table = [
-            (Bilinear, Repeat, [(0.05, 0.1, 0.9, 0.3), (0.95, 0.4, 2.1, 0.3), (1.2, -0.3, 0.3, 0.9)]),
-            (Bilinear, Mirror, [(0.05, 0.1, 0.0, 0.0), (0.95, 0.4, 3.0, 0.3), (1.2, -0.3, 2.7, 0.1)]),
-            (Bilinear, Clamp, [(0.3, 0.9, 0.7, 1.0), (1.2, -0.3, 3.0, 0.0), (-0.1, 0.6, 0.0, 0.7)]),
-            (Nearest, Repeat, [(-0.1, 0.6, 3.0, 1.0), (1.2, -0.3, 0.0, 1.0), (2.3, 0.2, 1.0, 0.0)]),
-            (Nearest, Mirror, [(-0.1, 0.6, 0.0, 1.0), (1.2, -0.3, 3.0, 0.0), (2.3, 0.2, 1.0, 0.0)]),
+            (
+                Bilinear,
+                Repeat,
+                [
+                    (0.05, 0.1, 0.9, 0.3),
+                    (0.95, 0.4, 2.1, 0.3),
+                    (1.2, -0.3, 0.3, 0.9),
+                ],
+            ),
+            (
+                Bilinear,
+                Mirror,
+                [
+                    (0.05, 0.1, 0.0, 0.0),
+                    (0.95, 0.4, 3.0, 0.3),
+                    (1.2, -0.3, 2.7, 0.1),
+                ],
+            ),
+            (
+                Bilinear,
+                Clamp,
+                [
+                    (0.3, 0.9, 0.7, 1.0),
+                    (1.2, -0.3, 3.0, 0.0),
+                    (-0.1, 0.6, 0.0, 0.7),
+                ],
+            ),
+            (
+                Nearest,
+                Repeat,
+                [
+                    (-0.1, 0.6, 3.0, 1.0),
+                    (1.2, -0.3, 0.0, 1.0),
+                    (2.3, 0.2, 1.0, 0.0),
+                ],
+            ),
+            (
+                Nearest,
+                Mirror,
+                [
+                    (-0.1, 0.6, 0.0, 1.0),
+                    (1.2, -0.3, 3.0, 0.0),
+                    (2.3, 0.2, 1.0, 0.0),
+                ],
+            ),
         ];
         for (interpolation, wrap, points) in table {
             let bitmap = ramp(interpolation, wrap);
@@ -229,10 +296,28 @@ mod tests {
 
     #[test]
     fn single_coloured_textures_fold() {
-        let texels = Texels::Bytes { data: vec![[255, 0, 255]; 6], srgb: true };
-        let picture = Arc::new(Picture { width: 3, height: 2, texels });
-        let bitmap = Bitmap { texels: picture, ..ramp(Interpolation::Bilinear, Wrap::Repeat) };
-        assert_eq!(Texture::Bitmap(bitmap).folded().as_constant(), Some(Rgb::new(1.0, 0.0, 1.0)));
-        assert!(Texture::Bitmap(ramp(Interpolation::Nearest, Wrap::Repeat)).folded().as_constant().is_none());
+        let texels = Texels::Bytes {
+            data: vec![[255, 0, 255]; 6],
+            srgb: true,
+        };
+        let picture = Arc::new(Picture {
+            width: 3,
+            height: 2,
+            texels,
+        });
+        let bitmap = Bitmap {
+            texels: picture,
+            ..ramp(Interpolation::Bilinear, Wrap::Repeat)
+        };
+        assert_eq!(
+            Texture::Bitmap(bitmap).folded().as_constant(),
+            Some(Rgb::new(1.0, 0.0, 1.0))
+        );
+        assert!(
+            Texture::Bitmap(ramp(Interpolation::Nearest, Wrap::Repeat))
+                .folded()
+                .as_constant()
+                .is_none()
+        );
     }
 }

@@ -38,11 +38,17 @@ fn check(light: &str, irradiance: f64) {
     for integrator in strategies {
         let got = plane_under(light, &integrator);
         // 65,536 samples: the standard error is below 0.05 % for every strategy that uses the light.
-        assert!((got / expected - 1.0).abs() < 2e-3, "{integrator}: {got}, expected {expected}");
+        assert!(
+            (got / expected - 1.0).abs() < 2e-3,
+            "{integrator}: {got}, expected {expected}"
+        );
     }
     // BSDF sampling alone finds the light rarely; its own standard error is about 0.5 %.
     let got = plane_under(light, &direct(0, 4));
-    assert!((got / expected - 1.0).abs() < 2e-2, "bsdf samples only: {got}, expected {expected}");
+    assert!(
+        (got / expected - 1.0).abs() < 2e-2,
+        "bsdf samples only: {got}, expected {expected}"
+    );
 }
 
 #[test]
@@ -64,7 +70,11 @@ fn sphere_light_over_a_plane() {
 /// (Lambert 1760): half the sum of the edges' angles times the cosines of their planes' normals.
 fn polygon_irradiance(corners: &[[f64; 3]]) -> f64 {
     let cross = |a: [f64; 3], b: [f64; 3]| {
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+        [
+            a[1] * b[2] - a[2] * b[1],
+            a[2] * b[0] - a[0] * b[2],
+            a[0] * b[1] - a[1] * b[0],
+        ]
     };
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let edge = |i: usize| {
@@ -79,8 +89,17 @@ fn polygon_irradiance(corners: &[[f64; 3]]) -> f64 {
 #[test]
 fn rectangle_light_over_a_plane() {
     // Half-widths, height, offset in x; the rectangle faces down.
-    for (hx, hy, z, x) in [(0.5, 0.4, 2.0, 1.2), (3.0, 0.2, 1.0, 3.5), (0.01, 0.01, 2.5, 0.5f64)] {
-        let corners = [[x - hx, -hy, z], [x + hx, -hy, z], [x + hx, hy, z], [x - hx, hy, z]];
+    for (hx, hy, z, x) in [
+        (0.5, 0.4, 2.0, 1.2),
+        (3.0, 0.2, 1.0, 3.5),
+        (0.01, 0.01, 2.5, 0.5f64),
+    ] {
+        let corners = [
+            [x - hx, -hy, z],
+            [x + hx, -hy, z],
+            [x + hx, hy, z],
+            [x - hx, hy, z],
+        ];
         let light = format!(
             r#"<shape type="rectangle">
                 <transform name="to_world"><scale x="{hx}" y="{hy}"/><rotate x="1" angle="180"/>
@@ -135,7 +154,10 @@ fn furnace_of_a_closed_sphere() {
         let got = mean_of(&picture(&scene(-1, &camera(16, 60.0), &content), 256, 2));
         let expected = 1.0 / (1.0 - albedo);
         // Roulette makes the noise: 65,536 samples, standard error below 0.06 %.
-        assert!((got / expected - 1.0).abs() < 2e-3, "albedo {albedo}: {got}, expected {expected}");
+        assert!(
+            (got / expected - 1.0).abs() < 2e-3,
+            "albedo {albedo}: {got}, expected {expected}"
+        );
     }
 }
 
@@ -148,6 +170,9 @@ fn path_depth_counts_edges() {
                 <emitter type="area"><rgb name="radiance" value="1"/></emitter></shape>"#;
         let got = mean_of(&picture(&scene(depth, &camera(16, 60.0), content), 256, 3));
         let expected = 2.0 * (1.0 - 0.5f64.powi(depth));
-        assert!((got / expected - 1.0).abs() < 2e-3, "depth {depth}: {got}, expected {expected}");
+        assert!(
+            (got / expected - 1.0).abs() < 2e-3,
+            "depth {depth}: {got}, expected {expected}"
+        );
     }
 }

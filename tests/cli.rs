@@ -24,8 +24,9 @@ impl Folder {
 
     fn files(&self) -> Vec<String> {
         let entries = fs::read_dir(&self.0).unwrap();
-        let mut names: Vec<String> =
-            entries.map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect();
+        let mut names: Vec<String> = entries
+            .map(|e| e.unwrap().file_name().to_string_lossy().into_owned())
+            .collect();
         names.sort();
         names
     }
@@ -38,7 +39,11 @@ impl Drop for Folder {
 }
 
 fn luxel(folder: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_luxel")).current_dir(folder).args(args).output().unwrap()
+    Command::new(env!("CARGO_BIN_EXE_luxel"))
+        .current_dir(folder)
+        .args(args)
+        .output()
+        .unwrap()
 }
 
 fn stderr(output: &Output) -> String {
@@ -60,11 +65,17 @@ const SMALL: &str = r#"<scene version="3.0.0">
 #[test]
 fn renders_the_built_in_scene_to_exr_and_png() {
     let folder = Folder::new("built-in");
-    let output = luxel(&folder.0, &["render", "--resolution", "32x32", "--spp", "16"]);
+    let output = luxel(
+        &folder.0,
+        &["render", "--resolution", "32x32", "--spp", "16"],
+    );
     assert!(output.status.success(), "{}", stderr(&output));
     assert_eq!(folder.files(), ["cornell-balls.exr", "cornell-balls.png"]);
     let said = stderr(&output);
-    assert!(said.contains("16 samples per pixel") && said.contains("estimated relMSE"), "{said}");
+    assert!(
+        said.contains("16 samples per pixel") && said.contains("estimated relMSE"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -72,18 +83,62 @@ fn writes_what_was_asked_for_and_statistics() {
     let folder = Folder::new("outputs");
     folder.write("small.xml", SMALL);
     let args = [
-        "render", "small.xml", "-o", "a.exr", "-o", "a.png", "-o", "a.jpg", "-o", "a.hdr", "-o", "a.pfm", "--stats",
-        "s.json", "--seed", "3", "--threads", "1", "-D", "albedo=0.25", "--progress", "never", "--aov",
+        "render",
+        "small.xml",
+        "-o",
+        "a.exr",
+        "-o",
+        "a.png",
+        "-o",
+        "a.jpg",
+        "-o",
+        "a.hdr",
+        "-o",
+        "a.pfm",
+        "--stats",
+        "s.json",
+        "--seed",
+        "3",
+        "--threads",
+        "1",
+        "-D",
+        "albedo=0.25",
+        "--progress",
+        "never",
+        "--aov",
         "albedo,normal,depth",
     ];
     let output = luxel(&folder.0, &args);
     assert!(output.status.success(), "{}", stderr(&output));
     assert_eq!(stderr(&output), "");
-    assert_eq!(folder.files(), ["a.exr", "a.hdr", "a.jpg", "a.pfm", "a.png", "s.json", "small.xml"]);
-    let stats: serde_json::Value = serde_json::from_str(&fs::read_to_string(folder.0.join("s.json")).unwrap()).unwrap();
+    assert_eq!(
+        folder.files(),
+        [
+            "a.exr",
+            "a.hdr",
+            "a.jpg",
+            "a.pfm",
+            "a.png",
+            "s.json",
+            "small.xml"
+        ]
+    );
+    let stats: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(folder.0.join("s.json")).unwrap()).unwrap();
     for key in [
-        "version", "scene", "integrator", "resolution", "spp", "seed", "threads", "seconds", "rays", "rays_per_second",
-        "peak_memory_bytes", "estimated_error", "plan",
+        "version",
+        "scene",
+        "integrator",
+        "resolution",
+        "spp",
+        "seed",
+        "threads",
+        "seconds",
+        "rays",
+        "rays_per_second",
+        "peak_memory_bytes",
+        "estimated_error",
+        "plan",
     ] {
         assert!(stats.get(key).is_some(), "{key} is missing");
     }
@@ -108,7 +163,19 @@ fn files_are_identical_for_any_thread_count() {
     let folder = Folder::new("threads");
     folder.write("small.xml", SMALL);
     let file = |threads: &str| {
-        let output = luxel(&folder.0, &["render", "small.xml", "-o", "x.pfm", "--threads", threads, "--spp", "64"]);
+        let output = luxel(
+            &folder.0,
+            &[
+                "render",
+                "small.xml",
+                "-o",
+                "x.pfm",
+                "--threads",
+                threads,
+                "--spp",
+                "64",
+            ],
+        );
         assert!(output.status.success(), "{}", stderr(&output));
         fs::read(folder.0.join("x.pfm")).unwrap()
     };
@@ -128,7 +195,12 @@ fn a_wrong_command_line_exits_with_2() {
         &["paint"],
     ] {
         let output = luxel(&folder.0, args);
-        assert_eq!(output.status.code(), Some(2), "{args:?}: {}", stderr(&output));
+        assert_eq!(
+            output.status.code(),
+            Some(2),
+            "{args:?}: {}",
+            stderr(&output)
+        );
     }
     assert_eq!(folder.files(), ["small.xml"]);
 }
@@ -149,8 +221,17 @@ fn a_wrong_scene_exits_with_1_and_writes_nothing() {
         &["info", "bad.xml"],
     ] {
         let output = luxel(&folder.0, args);
-        assert_eq!(output.status.code(), Some(1), "{args:?}: {}", stderr(&output));
-        assert!(stderr(&output).starts_with("error: "), "{}", stderr(&output));
+        assert_eq!(
+            output.status.code(),
+            Some(1),
+            "{args:?}: {}",
+            stderr(&output)
+        );
+        assert!(
+            stderr(&output).starts_with("error: "),
+            "{}",
+            stderr(&output)
+        );
     }
     assert_eq!(folder.files(), ["bad.xml"]);
 }
@@ -161,7 +242,12 @@ fn an_unwritable_output_exits_with_3_before_rendering() {
     for target in ["no/such/folder/x.exr", "x.gif"] {
         // The time limit would be noticed: nothing may be rendered first.
         let output = luxel(&folder.0, &["render", "-o", target, "--time", "1h"]);
-        assert_eq!(output.status.code(), Some(3), "{target}: {}", stderr(&output));
+        assert_eq!(
+            output.status.code(),
+            Some(3),
+            "{target}: {}",
+            stderr(&output)
+        );
     }
     assert!(folder.files().is_empty());
 }
@@ -169,10 +255,17 @@ fn an_unwritable_output_exits_with_3_before_rendering() {
 #[test]
 fn a_scene_without_light_is_black_with_a_warning() {
     let folder = Folder::new("dark");
-    folder.write("dark.xml", &SMALL.replace(r#"<emitter type="constant"/>"#, ""));
+    folder.write(
+        "dark.xml",
+        &SMALL.replace(r#"<emitter type="constant"/>"#, ""),
+    );
     let output = luxel(&folder.0, &["render", "dark.xml", "-o", "dark.pfm"]);
     assert!(output.status.success());
-    assert!(stderr(&output).contains("warning: the scene has no emitter"), "{}", stderr(&output));
+    assert!(
+        stderr(&output).contains("warning: the scene has no emitter"),
+        "{}",
+        stderr(&output)
+    );
     let image = luxel::image_io::Image::read(folder.0.join("dark.pfm")).unwrap();
     assert!(image.rgb().unwrap().iter().all(|c| c.is_black()));
 }
@@ -183,7 +276,10 @@ fn info_tells_what_is_there_and_what_is_supported() {
     folder.write("small.xml", SMALL);
     let output = luxel(&folder.0, &["info", "small.xml"]);
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(text.contains("20 x 10 pixels") && text.contains("because"), "{text}");
+    assert!(
+        text.contains("20 x 10 pixels") && text.contains("because"),
+        "{text}"
+    );
     let output = luxel(&folder.0, &["info", "--json", "small.xml"]);
     let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(json["film"]["width"], 20);
@@ -197,9 +293,17 @@ fn info_tells_what_is_there_and_what_is_supported() {
 #[test]
 fn completions_and_help_print() {
     let folder = Folder::new("help");
-    for args in [&["--help"][..], &["render", "--help"], &["completions", "bash"], &["--version"]] {
+    for args in [
+        &["--help"][..],
+        &["render", "--help"],
+        &["completions", "bash"],
+        &["--version"],
+    ] {
         let output = luxel(&folder.0, args);
-        assert!(output.status.success() && !output.stdout.is_empty(), "{args:?}");
+        assert!(
+            output.status.success() && !output.stdout.is_empty(),
+            "{args:?}"
+        );
     }
 }
 
@@ -207,7 +311,17 @@ fn completions_and_help_print() {
 #[test]
 fn interrupt_writes_what_is_done() {
     let folder = Folder::new("interrupt");
-    let args = ["render", "--resolution", "64x64", "--time", "10m", "-o", "x.exr", "--progress", "never"];
+    let args = [
+        "render",
+        "--resolution",
+        "64x64",
+        "--time",
+        "10m",
+        "-o",
+        "x.exr",
+        "--progress",
+        "never",
+    ];
     let child = Command::new(env!("CARGO_BIN_EXE_luxel"))
         .current_dir(&folder.0)
         .args(args)
@@ -215,7 +329,10 @@ fn interrupt_writes_what_is_done() {
         .spawn()
         .unwrap();
     std::thread::sleep(Duration::from_millis(1500));
-    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let kill = Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status()
+        .unwrap();
     assert!(kill.success());
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130), "{}", stderr(&output));

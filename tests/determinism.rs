@@ -12,12 +12,22 @@ const SCENE: &str = include_str!("../scenes/cornell-balls.xml");
 
 fn small(sampler: &str) -> String {
     SCENE
-        .replace(r#"name="resolution" value="512""#, r#"name="resolution" value="50""#)
-        .replace(r#"sampler type="independent""#, &format!(r#"sampler type="{sampler}""#))
+        .replace(
+            r#"name="resolution" value="512""#,
+            r#"name="resolution" value="50""#,
+        )
+        .replace(
+            r#"sampler type="independent""#,
+            &format!(r#"sampler type="{sampler}""#),
+        )
 }
 
 fn in_threads<T: Send>(n: usize, f: impl FnOnce() -> T + Send) -> T {
-    rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap().install(f)
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(n)
+        .build()
+        .unwrap()
+        .install(f)
 }
 
 #[test]
@@ -40,10 +50,12 @@ fn thread_count_does_not_change_a_bit() {
 fn stopping_early_equals_asking_for_less() {
     let compiled = compile(&small("sobol"));
     let stop_at = 16;
-    let (stopped, _) = compiled.job.render(Stop::Spp(512), |film, _| match film.spp() >= stop_at {
-        true => ControlFlow::Break(()),
-        false => ControlFlow::Continue(()),
-    });
+    let (stopped, _) = compiled
+        .job
+        .render(Stop::Spp(512), |film, _| match film.spp() >= stop_at {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        });
     // Passes depend on the clock, so the stop may come later than asked.
     let mut film = compiled.job.new_film(Stop::Spp(512));
     compiled.job.add_samples(&mut film, stopped.spp());
@@ -53,13 +65,25 @@ fn stopping_early_equals_asking_for_less() {
 #[test]
 fn a_crop_shows_the_same_pixels() {
     let whole = render::render(&compile(&small("sobol")), 8).0;
-    let crop = luxel::film::Window { x: 13, y: 21, width: 20, height: 17 };
-    let overrides = luxel::format::Overrides { crop: Some(crop), ..Default::default() };
+    let crop = luxel::film::Window {
+        x: 13,
+        y: 21,
+        width: 20,
+        height: 17,
+    };
+    let overrides = luxel::format::Overrides {
+        crop: Some(crop),
+        ..Default::default()
+    };
     let part = render::render(&render::compile_with(&small("sobol"), &overrides), 8).0;
     let (whole, part) = (whole.mean(), part.mean());
     for y in 0..17 {
         for x in 0..20 {
-            assert_eq!(part[y * 20 + x], whole[(y + 21) * 50 + x + 13], "({x}, {y})");
+            assert_eq!(
+                part[y * 20 + x],
+                whole[(y + 21) * 50 + x + 13],
+                "({x}, {y})"
+            );
         }
     }
 }

@@ -26,10 +26,16 @@ fn smooth_scene(sampler: &str) -> String {
 fn slope(points: &[(f64, f64)]) -> (f64, f64) {
     let n = points.len() as f64;
     let logs: Vec<(f64, f64)> = points.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
-    let (mx, my) = (logs.iter().map(|p| p.0).sum::<f64>() / n, logs.iter().map(|p| p.1).sum::<f64>() / n);
+    let (mx, my) = (
+        logs.iter().map(|p| p.0).sum::<f64>() / n,
+        logs.iter().map(|p| p.1).sum::<f64>() / n,
+    );
     let sxx: f64 = logs.iter().map(|p| (p.0 - mx).powi(2)).sum();
     let slope = logs.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum::<f64>() / sxx;
-    let residual: f64 = logs.iter().map(|p| (p.1 - my - slope * (p.0 - mx)).powi(2)).sum();
+    let residual: f64 = logs
+        .iter()
+        .map(|p| (p.1 - my - slope * (p.0 - mx)).powi(2))
+        .sum();
     let stderr = (residual / (n - 2.0) / sxx).sqrt();
     (slope, student_t_95(points.len() as u32 - 2) * stderr)
 }
@@ -52,7 +58,10 @@ fn error_falls_with_the_samples() {
     };
     let (independent, half) = fitted("independent");
     println!("independent: slope {independent:.3} +- {half:.3}");
-    assert!((independent + 0.5).abs() < 0.02 + half, "{independent} +- {half}");
+    assert!(
+        (independent + 0.5).abs() < 0.02 + half,
+        "{independent} +- {half}"
+    );
     let (sobol, half) = fitted("sobol");
     println!("sobol: slope {sobol:.3} +- {half:.3}");
     assert!(sobol + half < -0.55, "{sobol} +- {half}");
@@ -63,10 +72,18 @@ fn coverage(xml: &str, spp: u64, reference_spp: u64) -> f64 {
     let reference = picture(xml, reference_spp, 1000);
     let (mut inside, mut all) = (0, 0);
     for seed in 0..4 {
-        let overrides = luxel::format::Overrides { seed: Some(seed), ..Default::default() };
+        let overrides = luxel::format::Overrides {
+            seed: Some(seed),
+            ..Default::default()
+        };
         let (film, _) = render::render(&render::compile_with(xml, &overrides), spp);
         let t = student_t_95(film.replicates() - 1);
-        for ((m, s), r) in film.mean().iter().zip(film.standard_error()).zip(&reference) {
+        for ((m, s), r) in film
+            .mean()
+            .iter()
+            .zip(film.standard_error())
+            .zip(&reference)
+        {
             for c in 0..3 {
                 // A channel without any light is exact and tells nothing.
                 if s[c] > 0.0 {
@@ -82,14 +99,29 @@ fn coverage(xml: &str, spp: u64, reference_spp: u64) -> f64 {
 #[test]
 fn intervals_hold_the_truth_in_95_percent_of_the_pixels() {
     let boxed = include_str!("../scenes/cornell-balls.xml")
-        .replace(r#"name="resolution" value="512""#, r#"name="resolution" value="24""#)
-        .replace(r#"type="dielectric" id="glass""#, r#"type="diffuse" id="glass""#)
+        .replace(
+            r#"name="resolution" value="512""#,
+            r#"name="resolution" value="24""#,
+        )
+        .replace(
+            r#"type="dielectric" id="glass""#,
+            r#"type="diffuse" id="glass""#,
+        )
         .replace(r#"<string name="int_ior" value="bk7"/>"#, "")
         .replace(r#"<string name="ext_ior" value="air"/>"#, "")
-        .replace(r#"name="alpha" value="0.05""#, r#"name="alpha" value="0.5""#)
-        .replace(r#"name="max_depth" value="16""#, r#"name="max_depth" value="4""#);
-    let scenes =
-        [("smooth, sobol", smooth_scene("sobol")), ("smooth, independent", smooth_scene("independent")), ("box", boxed)];
+        .replace(
+            r#"name="alpha" value="0.05""#,
+            r#"name="alpha" value="0.5""#,
+        )
+        .replace(
+            r#"name="max_depth" value="16""#,
+            r#"name="max_depth" value="4""#,
+        );
+    let scenes = [
+        ("smooth, sobol", smooth_scene("sobol")),
+        ("smooth, independent", smooth_scene("independent")),
+        ("box", boxed),
+    ];
     for (name, xml) in scenes {
         let share = coverage(&xml, 512, 32768);
         println!("{name}: {:.2} %", 100.0 * share);

@@ -9,7 +9,11 @@ use render::picture;
 /// `offset` (scene sizes) along a crooked direction.
 fn scaled(scale: f64, offset: f64, radiance: f64) -> String {
     let m = offset * scale;
-    let place = format!(r#"<scale value="{scale:e}"/><translate x="{m:e}" y="{:e}" z="{:e}"/>"#, -0.7 * m, 0.9 * m);
+    let place = format!(
+        r#"<scale value="{scale:e}"/><translate x="{m:e}" y="{:e}" z="{:e}"/>"#,
+        -0.7 * m,
+        0.9 * m
+    );
     format!(
         r#"<scene version="3.0.0">
         <integrator type="path"><integer name="max_depth" value="5"/></integrator>
@@ -58,7 +62,10 @@ fn size_and_place_do_not_change_the_picture() {
     }
     for (scale, offset) in [(1.0, 1e3), (1.0, 1e6), (1e-6, 1e6), (1e6, -1e6)] {
         let ratio = mean_ratio(&picture(&scaled(scale, offset, 10.0), 64, 7), &reference);
-        assert!((ratio - 1.0).abs() < 2e-3, "scale {scale:e}, offset {offset:e}: ratio {ratio}");
+        assert!(
+            (ratio - 1.0).abs() < 2e-3,
+            "scale {scale:e}, offset {offset:e}: ratio {ratio}"
+        );
     }
 }
 
@@ -70,7 +77,10 @@ fn brightness_scales_exactly() {
         let bright = picture(&scaled(1.0, 0.0, factor), 16, 3);
         // Powers of two leave every mantissa as it is.
         for (a, b) in bright.iter().flatten().zip(reference.iter().flatten()) {
-            assert!((a - b * factor).abs() <= 1e-6 * b * factor, "{a} {b} at 2^{exponent}");
+            assert!(
+                (a - b * factor).abs() <= 1e-6 * b * factor,
+                "{a} {b} at 2^{exponent}"
+            );
         }
     }
 }
@@ -92,7 +102,11 @@ fn degenerate_geometry_gives_finite_pictures() {
             <emitter type="area"><rgb name="radiance" value="1e12"/></emitter></shape>"#,
         dir.display()
     );
-    let mean = picture(&render::scene(6, &render::camera(16, 40.0), &content), 64, 1);
+    let mean = picture(
+        &render::scene(6, &render::camera(16, 40.0), &content),
+        64,
+        1,
+    );
     assert!(mean.iter().flatten().all(|v| v.is_finite() && *v >= 0.0));
     std::fs::remove_dir_all(&dir).unwrap();
 }
@@ -105,8 +119,13 @@ fn long_paths_in_a_mirror_box_end_right() {
     let content = r#"<shape type="sphere"><float name="radius" value="5"/><boolean name="flip_normals" value="true"/>
         <bsdf type="conductor"><string name="material" value="none"/></bsdf>
         <emitter type="area"><rgb name="radiance" value="0.5"/></emitter></shape>"#;
-    let xml = render::scene(bounces, &render::camera(2, 40.0), content)
-        .replace("</integrator>", &format!(r#"<integer name="rr_depth" value="{}"/></integrator>"#, bounces + 1));
+    let xml = render::scene(bounces, &render::camera(2, 40.0), content).replace(
+        "</integrator>",
+        &format!(
+            r#"<integer name="rr_depth" value="{}"/></integrator>"#,
+            bounces + 1
+        ),
+    );
     let mean = render::mean_of(&picture(&xml, 1, 1));
     let expected = 0.5 * f64::from(bounces);
     assert!((mean / expected - 1.0).abs() < 1e-4, "{mean} {expected}");

@@ -53,9 +53,17 @@ fn imports_go_down() {
     let mut faults = Vec::new();
     for file in &files {
         let inside = file.strip_prefix(&root).unwrap();
-        let room = inside.iter().next().unwrap().to_string_lossy().replace(".rs", "");
+        let room = inside
+            .iter()
+            .next()
+            .unwrap()
+            .to_string_lossy()
+            .replace(".rs", "");
         let Some(own) = row(&room) else {
-            assert!(["lib", "main"].contains(&room.as_str()), "{room} has no row");
+            assert!(
+                ["lib", "main"].contains(&room.as_str()),
+                "{room} has no row"
+            );
             continue;
         };
         for (number, line) in fs::read_to_string(file).unwrap().lines().enumerate() {
@@ -65,7 +73,10 @@ fn imports_go_down() {
             }
             let place = format!("{}:{}", inside.display(), number + 1);
             for used in code.split("crate::").skip(1) {
-                let used: String = used.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+                let used: String = used
+                    .chars()
+                    .take_while(|c| c.is_alphanumeric() || *c == '_')
+                    .collect();
                 if let Some(other) = row(&used)
                     && used != room
                     && other >= own
@@ -74,7 +85,8 @@ fn imports_go_down() {
                 }
             }
             for (name, rooms) in CRATES {
-                let uses = code.starts_with(&format!("use {name}::")) || code.contains(&format!(" {name}::"));
+                let uses = code.starts_with(&format!("use {name}::"))
+                    || code.contains(&format!(" {name}::"));
                 if uses && !rooms.contains(&room.as_str()) {
                     faults.push(format!("{place}: {room} uses the crate {name}"));
                 }

@@ -42,8 +42,10 @@ pub fn run(args: &InfoArgs) -> Result<Outcome, Failure> {
             .iter()
             .map(|e| json!({ "subject": e.subject, "decision": e.decision, "reason": e.reason }))
             .collect();
-        let facts: serde_json::Map<_, _> =
-            facts(job, compiled.spp).into_iter().map(|(k, v)| (k.to_string(), v.into())).collect();
+        let facts: serde_json::Map<_, _> = facts(job, compiled.spp)
+            .into_iter()
+            .map(|(k, v)| (k.to_string(), v.into()))
+            .collect();
         let info = json!({
             "film": { "width": job.film.crop.width, "height": job.film.crop.height },
             "spp": compiled.spp,
@@ -60,7 +62,10 @@ pub fn run(args: &InfoArgs) -> Result<Outcome, Failure> {
     }
     println!("\nModelled");
     for e in plan {
-        println!("  {:<12} {}\n               because {}", e.subject, e.decision, e.reason);
+        println!(
+            "  {:<12} {}\n               because {}",
+            e.subject, e.decision, e.reason
+        );
     }
     for warning in &compiled.warnings {
         println!("\nwarning: {warning}");
@@ -72,19 +77,37 @@ fn facts(job: &Job, spp: u64) -> Vec<(&'static str, String)> {
     let counts = job.scene.counts();
     let crop = job.film.crop;
     let mut facts = vec![
-        ("film", format!("{} x {} pixels", job.film.width, job.film.height)),
-        ("samples", format!("{spp} per pixel, {}", job.sampler.name())),
+        (
+            "film",
+            format!("{} x {} pixels", job.film.width, job.film.height),
+        ),
+        (
+            "samples",
+            format!("{spp} per pixel, {}", job.sampler.name()),
+        ),
         ("integrator", job.integrator.name().to_string()),
-        ("shapes", format!("{} ({} triangles, {} exact)", counts.shapes, counts.triangles, counts.analytic)),
+        (
+            "shapes",
+            format!(
+                "{} ({} triangles, {} exact)",
+                counts.shapes, counts.triangles, counts.analytic
+            ),
+        ),
         ("materials", counts.materials.to_string()),
         ("emitters", counts.emitters.to_string()),
         (
             "memory",
-            format!("{:.1} MB for geometry and its hierarchy", counts.geometry_bytes as f64 / 1e6),
+            format!(
+                "{:.1} MB for geometry and its hierarchy",
+                counts.geometry_bytes as f64 / 1e6
+            ),
         ),
     ];
     if (crop.width, crop.height) != (job.film.width, job.film.height) {
-        let text = format!("{} x {} pixels at ({}, {})", crop.width, crop.height, crop.x, crop.y);
+        let text = format!(
+            "{} x {} pixels at ({}, {})",
+            crop.width, crop.height, crop.x, crop.y
+        );
         facts.insert(1, ("crop", text));
     }
     facts

@@ -56,7 +56,9 @@ pub enum Failure {
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Failure::Input(what) | Failure::Output(what) | Failure::Usage(what) => f.write_str(what),
+            Failure::Input(what) | Failure::Output(what) | Failure::Usage(what) => {
+                f.write_str(what)
+            }
         }
     }
 }
@@ -97,7 +99,11 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
             return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
         }
     };
-    let line = args.iter().map(|a| a.to_string_lossy()).collect::<Vec<_>>().join(" ");
+    let line = args
+        .iter()
+        .map(|a| a.to_string_lossy())
+        .collect::<Vec<_>>()
+        .join(" ");
     let result = match &cli.command {
         Command::Render(args) => render::run(args, &line),
         Command::Compare(args) => match compare::run(args) {

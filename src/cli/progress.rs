@@ -38,7 +38,9 @@ impl Progress {
                 bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
                 Progress::Bar(bar)
             }
-            ProgressMode::Auto => Progress::Lines { last: Instant::now() },
+            ProgressMode::Auto => Progress::Lines {
+                last: Instant::now(),
+            },
         }
     }
 
@@ -93,6 +95,10 @@ pub fn human_seconds(s: f64) -> String {
     match s {
         s if s < 60.0 => format!("{s:.1} s"),
         s if s < 3600.0 => format!("{} min {} s", (s / 60.0) as u64, (s % 60.0) as u64),
-        s => format!("{} h {} min", (s / 3600.0) as u64, (s % 3600.0 / 60.0) as u64),
+        s => format!(
+            "{} h {} min",
+            (s / 3600.0) as u64,
+            (s % 3600.0 / 60.0) as u64
+        ),
     }
 }

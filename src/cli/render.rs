@@ -67,7 +67,9 @@ pub struct RenderArgs {
 }
 
 fn parse_duration(text: &str) -> Result<Duration, String> {
-    let split = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());
+    let split = text
+        .find(|c: char| c.is_ascii_alphabetic())
+        .unwrap_or(text.len());
     let (number, unit) = text.split_at(split);
     let factor = match unit {
         "ms" => 1e-3,
@@ -76,16 +78,26 @@ fn parse_duration(text: &str) -> Result<Duration, String> {
         "h" => 3600.0,
         _ => return Err(format!("unknown unit \"{unit}\": use ms, s, m or h")),
     };
-    let seconds = number.trim().parse::<f64>().map_err(|_| "expected a time such as 90s or 5m".to_string())?;
+    let seconds = number
+        .trim()
+        .parse::<f64>()
+        .map_err(|_| "expected a time such as 90s or 5m".to_string())?;
     Duration::try_from_secs_f64(seconds * factor)
         .ok()
         .filter(|d| !d.is_zero())
         .ok_or_else(|| "expected a time above zero".to_string())
 }
 
-fn parse_numbers<const N: usize>(text: &str, separator: char, form: &str) -> Result<[u32; N], String> {
+fn parse_numbers<const N: usize>(
+    text: &str,
+    separator: char,
+    form: &str,
+) -> Result<[u32; N], String> {
     let numbers: Result<Vec<u32>, _> = text.split(separator).map(|n| n.trim().parse()).collect();
-    numbers.ok().and_then(|n| n.try_into().ok()).ok_or_else(|| format!("expected {form}"))
+    numbers
+        .ok()
+        .and_then(|n| n.try_into().ok())
+        .ok_or_else(|| format!("expected {form}"))
 }
 
 fn parse_resolution(text: &str) -> Result<[u32; 2], String> {
@@ -94,7 +106,12 @@ fn parse_resolution(text: &str) -> Result<[u32; 2], String> {
 
 fn parse_window(text: &str) -> Result<Window, String> {
     let [x, y, width, height] = parse_numbers(text, ',', "X,Y,W,H such as 100,50,64,64")?;
-    Ok(Window { x, y, width, height })
+    Ok(Window {
+        x,
+        y,
+        width,
+        height,
+    })
 }
 
 pub fn parse_define(text: &str) -> Result<(String, String), String> {
@@ -127,8 +144,12 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
         eprintln!("warning: {warning}");
     }
     let outputs = outputs(args);
-    outputs.iter().try_for_each(|path| Image::check_target(path))?;
-    args.stats.iter().try_for_each(|path| image_io::check_writable(path))?;
+    outputs
+        .iter()
+        .try_for_each(|path| Image::check_target(path))?;
+    args.stats
+        .iter()
+        .try_for_each(|path| image_io::check_writable(path))?;
 
     let stop = match (args.spp, args.time) {
         (Some(n), _) => Stop::Spp(n),
@@ -157,16 +178,27 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
     };
     let image = job.picture(&film, &stats, &metadata);
     write_all(&image, &outputs)?;
-    let seconds = Seconds { load, build, write: write_start.elapsed() };
+    let seconds = Seconds {
+        load,
+        build,
+        write: write_start.elapsed(),
+    };
     if let Some(path) = &args.stats {
-        let text = format!("{:#}\n", statistics(job, &film, &stats, &metadata, &seconds, threads));
+        let text = format!(
+            "{:#}\n",
+            statistics(job, &film, &stats, &metadata, &seconds, threads)
+        );
         image_io::write_atomic(path, text.as_bytes())?;
     }
     if args.progress != ProgressMode::Never {
         eprintln!("{}", summary(&film, &stats, &outputs));
     }
     report_invalid(&stats);
-    Ok(if stopped.load(Ordering::Relaxed) { Outcome::Interrupted } else { Outcome::Done })
+    Ok(if stopped.load(Ordering::Relaxed) {
+        Outcome::Interrupted
+    } else {
+        Outcome::Done
+    })
 }
 
 struct Seconds {
@@ -182,7 +214,9 @@ fn watch_for_interrupt(stopped: &Arc<AtomicBool>) -> Result<(), Failure> {
         if flag.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }
-        eprintln!("\nstopping after this pass and writing what is done; press Ctrl-C again to end at once");
+        eprintln!(
+            "\nstopping after this pass and writing what is done; press Ctrl-C again to end at once"
+        );
     };
     ctrlc::set_handler(handler).map_err(|e| Failure::Input(format!("cannot watch for Ctrl-C: {e}")))
 }
@@ -196,7 +230,9 @@ fn pool(threads: Option<u16>) -> Result<ThreadPool, Failure> {
 
 /// The scene's file name without folder and extension.
 fn scene_name(scene: Option<&Path>) -> String {
-    let stem = scene.and_then(Path::file_stem).map(|s| s.to_string_lossy().into_owned());
+    let stem = scene
+        .and_then(Path::file_stem)
+        .map(|s| s.to_string_lossy().into_owned());
     stem.unwrap_or_else(|| format::BUILT_IN_NAME.to_string())
 }
 
@@ -205,13 +241,19 @@ fn outputs(args: &RenderArgs) -> Vec<PathBuf> {
         return args.output.clone();
     }
     let name = scene_name(args.scene.as_deref());
-    ["exr", "png"].iter().map(|e| PathBuf::from(format!("{name}.{e}"))).collect()
+    ["exr", "png"]
+        .iter()
+        .map(|e| PathBuf::from(format!("{name}.{e}")))
+        .collect()
 }
 
 /// Writes to every output even if one fails: what took long to render must not be lost to one bad path.
 fn write_all(image: &Image, outputs: &[PathBuf]) -> Result<(), Failure> {
     let results: Vec<_> = outputs.iter().map(|path| image.write(path)).collect();
-    results.into_iter().collect::<Result<(), _>>().map_err(Failure::from)
+    results
+        .into_iter()
+        .collect::<Result<(), _>>()
+        .map_err(Failure::from)
 }
 
 /// One line: what was done, how fast, and how large the error is.
@@ -224,9 +266,16 @@ fn summary(film: &Film, stats: &Stats, outputs: &[PathBuf]) -> String {
                 e.relmse, e.ci95[0], e.ci95[1]
             )
         }
-        None => format!("{} samples per pixel give no estimate of the error", film.spp()),
+        None => format!(
+            "{} samples per pixel give no estimate of the error",
+            film.spp()
+        ),
     };
-    let files = outputs.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", ");
+    let files = outputs
+        .iter()
+        .map(|p| p.display().to_string())
+        .collect::<Vec<_>>()
+        .join(", ");
     format!(
         "{} samples per pixel in {}, {:.2} Mrays/s; {error}; wrote {files}",
         film.spp(),

@@ -230,17 +230,16 @@ impl Mesh {
         }
     }
 
-    /// Position and its error bound: the bound of the sum of products in f32 (Pharr, Jakob &
-    /// Humphreys, section 6.8.4), which also covers the rounding of the weights. The sum itself is
-    /// done in f64.
+    /// Position and its error bound. The position is summed in f64, so its own error is one rounding.
+    /// The bound also covers [`fp::PLANE_ERROR`]: a ray that starts on a large triangle must not meet
+    /// it again, even where a coordinate of the whole triangle, and with it the rounding, is zero.
     fn point(&self, prim: u32, b: Vec2) -> (Vec3, Vec3) {
         let p = self.triangle(prim);
         let [p0, p1, p2] = p.map(|p| p.as_dvec3());
         let (b1, b2) = (b.x as f64, b.y as f64);
-        let at = p0 + (p1 - p0) * b1 + (p2 - p0) * b2;
-        let b0 = (1.0 - b.x - b.y).max(0.0);
-        let p_err = (p[0].abs() * b0 + p[1].abs() * b.x + p[2].abs() * b.y) * fp::gamma(7);
-        (at.as_vec3(), p_err)
+        let at = (p0 + (p1 - p0) * b1 + (p2 - p0) * b2).as_vec3();
+        let extent = (p[1] - p[0]).abs().max((p[2] - p[0]).abs()).max_element();
+        (at, at.abs() * fp::gamma(2) + extent * fp::PLANE_ERROR)
     }
 
     /// dp/du and dp/dv of triangle `prim`: constant over it. Without texture coordinates the two edges

@@ -103,9 +103,12 @@ pub struct Endpoint {
 }
 
 impl Endpoint {
+    /// The point, moved towards `o` so far that a ray from there does not meet the surface of the point.
     #[inline]
     pub fn offset_towards(&self, o: Vec3) -> Vec3 {
-        fp::offset_origin(self.p, self.p_err, self.ng, o - self.p)
+        let d = o - self.p;
+        let p_err = self.p_err + d.length() * fp::PLANE_ERROR;
+        fp::offset_origin(self.p, p_err, self.ng, d)
     }
 }
 

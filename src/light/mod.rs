@@ -247,7 +247,14 @@ impl Lights {
             1 => "there is 1 light at finite distance".to_string(),
             n => format!("there are {n} lights at finite distance"),
         };
-        (if self.items.is_empty() { local } else { local + sky }, count)
+        (
+            if self.items.is_empty() {
+                local
+            } else {
+                local + sky
+            },
+            count,
+        )
     }
 
     pub fn is_emitter(&self, shape: ShapeId) -> bool {

@@ -13,6 +13,14 @@ pub const fn gamma(n: u32) -> f32 {
 /// The largest float below one: what a number from [0,1) must not exceed.
 pub const ONE_MINUS_EPSILON: f32 = 1.0 - f32::EPSILON / 2.0;
 
+/// Bound on how far from the plane of a triangle the triangle test may believe a ray to pass that in
+/// truth passes within it, relative to the largest offset of a corner from the ray's origin. An edge
+/// function errs by about eight roundings of the product of two offsets (subtraction, shear and product
+/// of each), and so do the barycentric weights that mix the corners' distances; the bound doubles that.
+/// It is an error along the normal: along the ray it grows with one over the cosine, as it does for the
+/// offset of an origin.
+pub const PLANE_ERROR: f32 = gamma(16);
+
 /// The origin of a ray that leaves the surface at `p` towards `w`: moved along `ng` out of the box of
 /// half-width `p_err` around `p`, to the side of `w`, so that the ray cannot meet the surface it
 /// leaves. Each coordinate is then rounded away from the surface (Pharr, Jakob & Humphreys, section 6.8.6).

@@ -117,7 +117,10 @@ impl Job {
         let work = |tile: &mut Tile| self.render_tile(tile, first, n, &filter);
         let done: Vec<(PathStats, Invalid)> = film.tiles_mut().par_iter_mut().map(work).collect();
         film.finish_pass(n);
-        let mut stats = Stats { seconds: start.elapsed().as_secs_f64(), ..Stats::default() };
+        let mut stats = Stats {
+            seconds: start.elapsed().as_secs_f64(),
+            ..Stats::default()
+        };
         for (rays, invalid) in done {
             stats.rays += rays;
             stats.invalid.merge(invalid);
@@ -126,7 +129,13 @@ impl Job {
     }
 
     /// Adds the samples `first..first + n` of every pixel of the tile.
-    fn render_tile(&self, tile: &mut Tile, first: u64, n: u64, filter: &FilterSampler) -> (PathStats, Invalid) {
+    fn render_tile(
+        &self,
+        tile: &mut Tile,
+        first: u64,
+        n: u64,
+        filter: &FilterSampler,
+    ) -> (PathStats, Invalid) {
         let (mut rays, mut invalid) = (PathStats::default(), Invalid::default());
         let aovs: Vec<Aov> = self.aovs.iter().map(|l| l.aov).collect();
         let mut aov_values = Vec::new();
@@ -140,7 +149,9 @@ impl Job {
                     let sampler = Sampler::new(self.sampler, self.seed, pixel, s, replicates);
                     let [u, v, ..] = sampler.get4(dim::CAMERA);
                     let (offset, weight) = filter.sample(Vec2::new(u, v));
-                    let ray = self.camera.ray(Vec2::new(px as f32 + 0.5, py as f32 + 0.5) + offset);
+                    let ray = self
+                        .camera
+                        .ray(Vec2::new(px as f32 + 0.5, py as f32 + 0.5) + offset);
                     let radiance = self.integrator.li(&self.scene, ray, &sampler, &mut rays);
                     // A NaN fails the comparison too.
                     if radiance.is_finite() && radiance.min_component() >= 0.0 {
@@ -174,7 +185,9 @@ fn next_pass(stop: Stop, done: u64, elapsed: Duration) -> Option<u64> {
     let affordable = |time: f64| (time / per_sample.max(1e-9)) as u64;
     match stop {
         // At most doubling: the first passes also pay for warming up.
-        Stop::Spp(n) => (n > done).then(|| affordable(PASS.as_secs_f64()).clamp(1, done).min(n - done)),
+        Stop::Spp(n) => {
+            (n > done).then(|| affordable(PASS.as_secs_f64()).clamp(1, done).min(n - done))
+        }
         Stop::Time(limit) => {
             let left = limit.checked_sub(elapsed)?.as_secs_f64();
             let n = affordable(left.min(PASS.as_secs_f64())).min(done);

@@ -28,7 +28,10 @@ pub enum PixelFormat {
 
 impl PixelFormat {
     pub fn has_alpha(self) -> bool {
-        matches!(self, PixelFormat::LuminanceAlpha | PixelFormat::Rgba | PixelFormat::Xyza)
+        matches!(
+            self,
+            PixelFormat::LuminanceAlpha | PixelFormat::Rgba | PixelFormat::Xyza
+        )
     }
 }
 
@@ -59,19 +62,35 @@ impl Job {
         image.layers.push(self.color_layer(&mean, store));
         if film.has_error() {
             let stderr: Vec<Rgb> = film.standard_error().iter().map(to_rgb).collect();
-            image.layers.push(Layer::from_rgb("stderr", &stderr, Samples::Float));
+            image
+                .layers
+                .push(Layer::from_rgb("stderr", &stderr, Samples::Float));
         }
         let spp = u32::try_from(film.spp()).unwrap_or(u32::MAX);
-        image.layers.push(Layer::from_scalar("spp", Samples::Uint(vec![spp; mean.len()])));
+        image.layers.push(Layer::from_scalar(
+            "spp",
+            Samples::Uint(vec![spp; mean.len()]),
+        ));
         let mut first = 0;
         for layer in &self.aovs {
             let names = layer.aov.channels();
-            let plane = |c: usize| film.aov(first + c).iter().map(|v| *v as f32).collect::<Vec<f32>>();
-            let channel = |c: usize| Channel { name: names[c].to_string(), samples: Samples::Float(plane(c)) };
+            let plane = |c: usize| {
+                film.aov(first + c)
+                    .iter()
+                    .map(|v| *v as f32)
+                    .collect::<Vec<f32>>()
+            };
+            let channel = |c: usize| Channel {
+                name: names[c].to_string(),
+                samples: Samples::Float(plane(c)),
+            };
             let channels = (0..names.len()).map(channel);
             match layer.aov {
                 Aov::Alpha => image.layers[0].channels.extend(channels),
-                _ => image.layers.push(Layer { name: layer.name.clone(), channels: channels.collect() }),
+                _ => image.layers.push(Layer {
+                    name: layer.name.clone(),
+                    channels: channels.collect(),
+                }),
             }
             first += names.len();
         }
@@ -86,9 +105,10 @@ impl Job {
         };
         match self.pixel_format {
             PixelFormat::Rgb | PixelFormat::Rgba => Layer::from_rgb("", mean, store),
-            PixelFormat::Luminance | PixelFormat::LuminanceAlpha => {
-                Layer { name: String::new(), channels: vec![single("Y", &|c| c.luminance())] }
-            }
+            PixelFormat::Luminance | PixelFormat::LuminanceAlpha => Layer {
+                name: String::new(),
+                channels: vec![single("Y", &|c| c.luminance())],
+            },
             PixelFormat::Xyz | PixelFormat::Xyza => {
                 let row = |r: [f32; 3]| move |c: &Rgb| r[0] * c.r + r[1] * c.g + r[2] * c.b;
                 let channels = vec![
@@ -96,7 +116,10 @@ impl Job {
                     single("Y", &row([0.212_671, 0.715_160, 0.072_169])),
                     single("Z", &row([0.019_334, 0.119_193, 0.950_227])),
                 ];
-                Layer { name: String::new(), channels }
+                Layer {
+                    name: String::new(),
+                    channels,
+                }
             }
         }
     }

@@ -59,8 +59,14 @@ impl Camera {
         // x = half_width (1 - 2 (px / w + offset)), likewise y with half_width h / w.
         let [ox, oy] = spec.principal_point_offset;
         let half_height = half_width * h / w;
-        let corner = Vec2::new((half_width * (1.0 - 2.0 * ox)) as f32, (half_height * (1.0 - 2.0 * oy)) as f32);
-        let per_pixel = Vec2::new((-2.0 * half_width / w) as f32, (-2.0 * half_height / h) as f32);
+        let corner = Vec2::new(
+            (half_width * (1.0 - 2.0 * ox)) as f32,
+            (half_height * (1.0 - 2.0 * oy)) as f32,
+        );
+        let per_pixel = Vec2::new(
+            (-2.0 * half_width / w) as f32,
+            (-2.0 * half_height / h) as f32,
+        );
         let axis = |v: DVec3| spec.to_world.vector(v).normalize().as_vec3();
         Camera {
             origin: (spec.to_world.point(DVec3::ZERO) - center).as_vec3(),
@@ -80,7 +86,11 @@ impl Camera {
         let length = d.length();
         let d = self.axes * (d / length);
         let near = self.near * length;
-        Ray { o: self.origin + d * near, d, t_max: self.far * length - near }
+        Ray {
+            o: self.origin + d * near,
+            d,
+            t_max: self.far * length - near,
+        }
     }
 }
 
@@ -90,8 +100,18 @@ mod tests {
     use crate::film::{Filter, Window};
 
     fn film() -> FilmSpec {
-        let crop = Window { x: 0, y: 0, width: 200, height: 100 };
-        FilmSpec { width: 200, height: 100, crop, filter: Filter::Box { radius: 0.5 } }
+        let crop = Window {
+            x: 0,
+            y: 0,
+            width: 200,
+            height: 100,
+        };
+        FilmSpec {
+            width: 200,
+            height: 100,
+            crop,
+            filter: Filter::Box { radius: 0.5 },
+        }
     }
 
     fn spec() -> PerspectiveSpec {
@@ -110,26 +130,66 @@ mod tests {
         // Directions through the point (0.3, 0.2) of the picture, measured with Mitsuba 3.9.1.
         let table = [
             (spec(), [0.143_235_5, 0.107_426_7, 0.983_841]),
-            (PerspectiveSpec { fov_axis: FovAxis::Y, ..spec() }, [0.273_616_1, 0.205_212_1, 0.939_692_6]),
-            (PerspectiveSpec { fov_axis: FovAxis::Smaller, ..spec() }, [0.273_616_1, 0.205_212_1, 0.939_692_6]),
-            (PerspectiveSpec { fov_axis: FovAxis::Larger, ..spec() }, [0.143_235_5, 0.107_426_7, 0.983_841]),
-            (PerspectiveSpec { fov_axis: FovAxis::Diagonal, ..spec() }, [0.128_526_5, 0.096_394_8, 0.987_010_2]),
             (
-                PerspectiveSpec { principal_point_offset: [0.1, -0.2], ..spec() },
+                PerspectiveSpec {
+                    fov_axis: FovAxis::Y,
+                    ..spec()
+                },
+                [0.273_616_1, 0.205_212_1, 0.939_692_6],
+            ),
+            (
+                PerspectiveSpec {
+                    fov_axis: FovAxis::Smaller,
+                    ..spec()
+                },
+                [0.273_616_1, 0.205_212_1, 0.939_692_6],
+            ),
+            (
+                PerspectiveSpec {
+                    fov_axis: FovAxis::Larger,
+                    ..spec()
+                },
+                [0.143_235_5, 0.107_426_7, 0.983_841],
+            ),
+            (
+                PerspectiveSpec {
+                    fov_axis: FovAxis::Diagonal,
+                    ..spec()
+                },
+                [0.128_526_5, 0.096_394_8, 0.987_010_2],
+            ),
+            (
+                PerspectiveSpec {
+                    principal_point_offset: [0.1, -0.2],
+                    ..spec()
+                },
                 [0.071_434_8, 0.178_587, 0.981_327_6],
             ),
         ];
         for (spec, want) in table {
             let ray = Camera::perspective(&spec, &film(), DVec3::ZERO).ray(Vec2::new(60.0, 20.0));
-            assert!((ray.d - Vec3::from_array(want)).length() < 2e-6, "{spec:?}: {}", ray.d);
+            assert!(
+                (ray.d - Vec3::from_array(want)).length() < 2e-6,
+                "{spec:?}: {}",
+                ray.d
+            );
         }
     }
 
     #[test]
     fn rays_run_from_the_near_to_the_far_plane() {
-        let spec = PerspectiveSpec { near_clip: 1.0, far_clip: 10.0, ..spec() };
-        let ray = Camera::perspective(&spec, &film(), DVec3::new(0.0, 0.0, -3.0)).ray(Vec2::new(60.0, 20.0));
-        assert!((ray.o - Vec3::new(0.145_588, 0.109_191, 4.0)).length() < 1e-5, "{}", ray.o);
+        let spec = PerspectiveSpec {
+            near_clip: 1.0,
+            far_clip: 10.0,
+            ..spec()
+        };
+        let ray = Camera::perspective(&spec, &film(), DVec3::new(0.0, 0.0, -3.0))
+            .ray(Vec2::new(60.0, 20.0));
+        assert!(
+            (ray.o - Vec3::new(0.145_588, 0.109_191, 4.0)).length() < 1e-5,
+            "{}",
+            ray.o
+        );
         assert!((ray.t_max - 9.147_82).abs() < 1e-4);
     }
 }

@@ -74,14 +74,25 @@ impl Scene {
         center: DVec3,
         mut plan: Plan,
     ) -> Scene {
-        let shapes = || geometries.iter().enumerate().map(|(i, g)| (ShapeId(i as u32), g));
+        let shapes = || {
+            geometries
+                .iter()
+                .enumerate()
+                .map(|(i, g)| (ShapeId(i as u32), g))
+        };
         let mesh = |(shape, g)| match g {
-            &Geometry::Mesh(ref m) => Some(MeshRef { shape, positions: m.positions(), indices: m.indices() }),
+            &Geometry::Mesh(ref m) => Some(MeshRef {
+                shape,
+                positions: m.positions(),
+                indices: m.indices(),
+            }),
             _ => None,
         };
         let meshes: Vec<MeshRef> = shapes().filter_map(mesh).collect();
-        let others: Vec<_> =
-            shapes().filter(|(_, g)| !matches!(g, Geometry::Mesh(_))).map(|(id, g)| (id, g.bounds())).collect();
+        let others: Vec<_> = shapes()
+            .filter(|(_, g)| !matches!(g, Geometry::Mesh(_)))
+            .map(|(id, g)| (id, g.bounds()))
+            .collect();
         let accel = Accel::build(&meshes, &others);
         let has_analytic = !others.is_empty();
         let emitters_can_be_met = emitters.iter().any(|e| !matches!(e, Emitter::Point { .. }));
@@ -208,7 +219,11 @@ impl std::fmt::Debug for Scene {
 
 fn plan_of_scene(plan: &mut Plan, lights: &Lights, has_analytic: bool, emitters_can_be_met: bool) {
     match has_analytic {
-        true => plan.add("shapes", "triangles and exact shapes in one tree", "there are spheres, disks or cylinders"),
+        true => plan.add(
+            "shapes",
+            "triangles and exact shapes in one tree",
+            "there are spheres, disks or cylinders",
+        ),
         false => plan.add("shapes", "triangles only", "no shape is anything else"),
     }
     let (decision, reason) = lights.choice();

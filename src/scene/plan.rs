@@ -18,7 +18,16 @@ pub struct Plan {
 }
 
 impl Plan {
-    pub fn add(&mut self, subject: &'static str, decision: impl Into<String>, reason: impl Into<String>) {
-        self.entries.push(PlanEntry { subject, decision: decision.into(), reason: reason.into() });
+    pub fn add(
+        &mut self,
+        subject: &'static str,
+        decision: impl Into<String>,
+        reason: impl Into<String>,
+    ) {
+        self.entries.push(PlanEntry {
+            subject,
+            decision: decision.into(),
+            reason: reason.into(),
+        });
     }
 }

@@ -45,7 +45,11 @@ impl Aov {
 /// the sample that the ray belongs to.
 pub fn evaluate(scene: &Scene, ray: &Ray, radiance: Rgb, aovs: &[Aov], out: &mut Vec<f32>) {
     let needs_surface = aovs.iter().any(|a| *a != Aov::SecondMoment);
-    let hit = if needs_surface { scene.intersect(ray) } else { None };
+    let hit = if needs_surface {
+        scene.intersect(ray)
+    } else {
+        None
+    };
     for aov in aovs {
         let start = out.len();
         match (aov, &hit) {
@@ -55,7 +59,9 @@ pub fn evaluate(scene: &Scene, ray: &Ray, radiance: Rgb, aovs: &[Aov], out: &mut
                 out.push(f32::from(seen));
             }
             (_, None) => out.resize(start + aov.channels().len(), 0.0),
-            (Aov::Albedo, Some(h)) => out.extend(scene.bsdf(h).albedo(h.frame.to_local(h.wo)).to_array()),
+            (Aov::Albedo, Some(h)) => {
+                out.extend(scene.bsdf(h).albedo(h.frame.to_local(h.wo)).to_array())
+            }
             (Aov::ShadingNormal, Some(h)) => out.extend(h.frame.n.to_array()),
             (Aov::GeometricNormal, Some(h)) => out.extend(h.ng.to_array()),
             (Aov::Position, Some(h)) => {

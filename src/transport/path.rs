@@ -72,7 +72,12 @@ fn emission(scene: &Scene, ray: &Ray, met: Option<&Hit>, departure: Option<Depar
 /// The first surface that the camera sees along `ray`. Hidden emitters are not there for the camera: it
 /// sees through them.
 #[inline]
-fn first_seen(scene: &Scene, mut ray: Ray, hide_emitters: bool, stats: &mut PathStats) -> Option<Hit> {
+fn first_seen(
+    scene: &Scene,
+    mut ray: Ray,
+    hide_emitters: bool,
+    stats: &mut PathStats,
+) -> Option<Hit> {
     loop {
         stats.camera += 1;
         let hit = scene.intersect(&ray)?;
@@ -80,7 +85,10 @@ fn first_seen(scene: &Scene, mut ray: Ray, hide_emitters: bool, stats: &mut Path
             return Some(hit);
         }
         let t_max = ray.t_max - hit.p.distance(ray.o);
-        ray = Ray { t_max, ..hit.spawn(ray.d) };
+        ray = Ray {
+            t_max,
+            ..hit.spawn(ray.d)
+        };
     }
 }
 
@@ -98,8 +106,11 @@ impl PathSpec {
                 0 => first_seen(scene, ray, self.hide_emitters, stats),
                 _ => scene.intersect(&ray),
             };
-            let departure =
-                last.as_ref().map(|(from, density)| Departure { from, density: *density, light_per_bsdf: 1.0 });
+            let departure = last.as_ref().map(|(from, density)| Departure {
+                from,
+                density: *density,
+                light_per_bsdf: 1.0,
+            });
             if depth > 0 || !self.hide_emitters {
                 lo += throughput * emission(scene, &ray, met.as_ref(), departure);
             }
@@ -111,7 +122,9 @@ impl PathSpec {
             }
             let bsdf = scene.bsdf(&hit);
             if !bsdf.is_delta() && scene.has_lights() {
-                let mis = Mis::Power { bsdf_per_light: 1.0 };
+                let mis = Mis::Power {
+                    bsdf_per_light: 1.0,
+                };
                 let numbers = numbers_at(sampler, depth, dim::LIGHT);
                 lo += throughput * direct_light(scene, &hit, &bsdf, mis, numbers, stats);
             }
@@ -160,7 +173,9 @@ impl DirectSpec {
         if !bsdf.is_delta() && scene.has_lights() {
             let mis = match self.bsdf_samples {
                 0 => Mis::LightOnly,
-                _ => Mis::Power { bsdf_per_light: n_bsdf / n_light },
+                _ => Mis::Power {
+                    bsdf_per_light: n_bsdf / n_light,
+                },
             };
             for i in 0..self.emitter_samples {
                 let numbers = numbers_at(sampler, i, dim::LIGHT);
@@ -178,10 +193,15 @@ impl DirectSpec {
             };
             let ray = hit.spawn(hit.frame.to_world(sample.wi));
             stats.indirect += 1;
-            let departure =
-                Departure { from: &hit, density: sample.density, light_per_bsdf: n_light / n_bsdf };
+            let departure = Departure {
+                from: &hit,
+                density: sample.density,
+                light_per_bsdf: n_light / n_bsdf,
+            };
             let met = scene.intersect(&ray);
-            lo += sample.weight * emission(scene, &ray, met.as_ref(), Some(departure)) * (1.0 / n_bsdf);
+            lo += sample.weight
+                * emission(scene, &ray, met.as_ref(), Some(departure))
+                * (1.0 / n_bsdf);
         }
         lo
     }

@@ -13,20 +13,26 @@ pub fn compile(xml: &str) -> Compiled {
 }
 
 pub fn compile_with(xml: &str, overrides: &Overrides) -> Compiled {
-    let desc = format::load_str("test.xml", xml, Path::new("."), &[]).unwrap_or_else(|e| panic!("{e}"));
+    let desc =
+        format::load_str("test.xml", xml, Path::new("."), &[]).unwrap_or_else(|e| panic!("{e}"));
     format::compile(&desc, overrides).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// `spp` samples per pixel; fails when any of them was not a finite, positive number.
 pub fn render(compiled: &Compiled, spp: u64) -> (Film, Stats) {
-    let (film, stats) = compiled.job.render(Stop::Spp(spp), |_, _| ControlFlow::Continue(()));
+    let (film, stats) = compiled
+        .job
+        .render(Stop::Spp(spp), |_, _| ControlFlow::Continue(()));
     assert_eq!(stats.invalid.count, 0, "{:?}", stats.invalid);
     (film, stats)
 }
 
 /// The mean picture of `xml` at `spp` samples per pixel, random numbers from `seed`.
 pub fn picture(xml: &str, spp: u64, seed: u64) -> Vec<[f64; 3]> {
-    let overrides = Overrides { seed: Some(seed), ..Overrides::default() };
+    let overrides = Overrides {
+        seed: Some(seed),
+        ..Overrides::default()
+    };
     render(&compile_with(xml, &overrides), spp).0.mean()
 }
 

@@ -1,6 +1,6 @@
 //! Film, sampler and camera.
 
-use crate::film::{Filter, FilmSpec, Window};
+use crate::film::{FilmSpec, Filter, Window};
 use crate::format::plugins::Category;
 use crate::format::{Overrides, Props, SceneError};
 use crate::math::DVec3;
@@ -45,11 +45,17 @@ pub fn film(sensor: &Props, overrides: &Overrides) -> Result<Film, SceneError> {
             _ => PixelFormat::Rgb,
         };
         // Mitsuba stores half floats unless told otherwise; here nobody loses precision by not asking.
-        component_format = match (p.is_given("component_format"), p.choice("component_format")?) {
+        component_format = match (
+            p.is_given("component_format"),
+            p.choice("component_format")?,
+        ) {
             (true, "float16") => ComponentFormat::Float16,
             (true, "uint32") => {
                 return Err(p
-                    .error_at("component_format", "component_format \"uint32\" is not supported")
+                    .error_at(
+                        "component_format",
+                        "component_format \"uint32\" is not supported",
+                    )
                     .with_help("use \"float32\" or \"float16\""));
             }
             _ => ComponentFormat::Float32,
@@ -68,10 +74,16 @@ pub fn film(sensor: &Props, overrides: &Overrides) -> Result<Film, SceneError> {
     let [width, height] = size;
     let pixels = u64::from(width) * u64::from(height);
     if pixels == 0 {
-        return Err(sensor.error(format!("a picture of {width} x {height} pixels has no pixel")));
+        return Err(sensor.error(format!(
+            "a picture of {width} x {height} pixels has no pixel"
+        )));
     }
-    let crop =
-        overrides.crop.or(crop).unwrap_or(Window { x: 0, y: 0, width, height });
+    let crop = overrides.crop.or(crop).unwrap_or(Window {
+        x: 0,
+        y: 0,
+        width,
+        height,
+    });
     let fits = |start: u32, length: u32, size: u32| {
         length > 0 && u64::from(start) + u64::from(length) <= u64::from(size)
     };
@@ -87,11 +99,25 @@ pub fn film(sensor: &Props, overrides: &Overrides) -> Result<Film, SceneError> {
         let what = format!("{rendered} pixels are more than a picture can have ({MAX_PIXELS})");
         return Err(props.as_ref().unwrap_or(sensor).error(what));
     }
-    Ok(Film { spec: FilmSpec { width, height, crop, filter }, pixel_format, component_format })
+    Ok(Film {
+        spec: FilmSpec {
+            width,
+            height,
+            crop,
+            filter,
+        },
+        pixel_format,
+        component_format,
+    })
 }
 
 fn crop_of(film: &Props, size: [u32; 2]) -> Result<Option<Window>, SceneError> {
-    let names = ["crop_offset_x", "crop_offset_y", "crop_width", "crop_height"];
+    let names = [
+        "crop_offset_x",
+        "crop_offset_y",
+        "crop_width",
+        "crop_height",
+    ];
     let given = names.iter().any(|n| film.is_given(n));
     let window = Window {
         x: film.int("crop_offset_x")? as u32,
@@ -105,11 +131,20 @@ fn crop_of(film: &Props, size: [u32; 2]) -> Result<Option<Window>, SceneError> {
 fn filter_of(p: &Props) -> Result<Filter, SceneError> {
     Ok(match p.plugin() {
         "box" => Filter::Box { radius: 0.5 },
-        "tent" => Filter::Tent { radius: p.float("radius")? as f32 },
-        "mitchell" => Filter::Mitchell { b: p.float("B")? as f32, c: p.float("C")? as f32 },
+        "tent" => Filter::Tent {
+            radius: p.float("radius")? as f32,
+        },
+        "mitchell" => Filter::Mitchell {
+            b: p.float("B")? as f32,
+            c: p.float("C")? as f32,
+        },
         "catmullrom" => Filter::Mitchell { b: 0.0, c: 0.5 },
-        "lanczos" => Filter::Lanczos { lobes: p.int("lobes")? as f32 },
-        _ => Filter::Gaussian { stddev: p.float("stddev")? as f32 },
+        "lanczos" => Filter::Lanczos {
+            lobes: p.int("lobes")? as f32,
+        },
+        _ => Filter::Gaussian {
+            stddev: p.float("stddev")? as f32,
+        },
     })
 }
 
@@ -122,20 +157,33 @@ pub struct SamplerSpec {
 /// Samples per pixel when nobody says how many: Mitsuba's default.
 const DEFAULT_SPP: u64 = 4;
 
-pub fn sampler(sensor: &Props, overrides: &Overrides, plan: &mut Plan) -> Result<SamplerSpec, SceneError> {
+pub fn sampler(
+    sensor: &Props,
+    overrides: &Overrides,
+    plan: &mut Plan,
+) -> Result<SamplerSpec, SceneError> {
     let props = sensor.child(Category::Sampler);
-    let mut spec = SamplerSpec { kind: SamplerKind::Sobol, spp: DEFAULT_SPP, seed: 0 };
+    let mut spec = SamplerSpec {
+        kind: SamplerKind::Sobol,
+        spp: DEFAULT_SPP,
+        seed: 0,
+    };
     let mut reason = "the scene names no sampler, and these points converge fastest".to_string();
     if let Some(p) = &props {
         spec.spp = p.int("sample_count")? as u64;
         spec.seed = p.int("seed")? as u64;
         p.ignore(&["jitter", "strength"]);
         (spec.kind, reason) = match p.plugin() {
-            "independent" => (SamplerKind::Independent, "the scene asks for it".to_string()),
+            "independent" => (
+                SamplerKind::Independent,
+                "the scene asks for it".to_string(),
+            ),
             "sobol" => (SamplerKind::Sobol, "the scene asks for it".to_string()),
             other => (
                 SamplerKind::Sobol,
-                format!("the scene asks for \"{other}\", and this is the nearest: stratified in every pair of dimensions"),
+                format!(
+                    "the scene asks for \"{other}\", and this is the nearest: stratified in every pair of dimensions"
+                ),
             ),
         };
     }
@@ -144,7 +192,9 @@ pub fn sampler(sensor: &Props, overrides: &Overrides, plan: &mut Plan) -> Result
             "independent" => SamplerKind::Independent,
             "sobol" => SamplerKind::Sobol,
             _ => {
-                let error = sensor.error(format!("unknown sampler \"{name}\" asked for on the command line"));
+                let error = sensor.error(format!(
+                    "unknown sampler \"{name}\" asked for on the command line"
+                ));
                 return Err(error.with_help(suggest(name, ["independent", "sobol"])));
             }
         };
@@ -164,9 +214,15 @@ pub fn camera(sensor: &Props, film: &FilmSpec, center: DVec3) -> Result<Camera, 
     }
     let (near, far) = (sensor.float("near_clip")?, sensor.float("far_clip")?);
     if near >= far {
-        return Err(sensor.error_at("near_clip", format!("near_clip {near} is not below far_clip {far}")));
+        return Err(sensor.error_at(
+            "near_clip",
+            format!("near_clip {near} is not below far_clip {far}"),
+        ));
     }
-    let open_close = [sensor.float("shutter_open")?, sensor.float("shutter_close")?];
+    let open_close = [
+        sensor.float("shutter_open")?,
+        sensor.float("shutter_close")?,
+    ];
     if open_close[0] > open_close[1] {
         return Err(sensor.error_at("shutter_open", "the shutter closes before it opens"));
     }
@@ -188,19 +244,37 @@ pub fn camera(sensor: &Props, film: &FilmSpec, center: DVec3) -> Result<Camera, 
             (fov_of_focal_length(sensor)?, FovAxis::Diagonal)
         }
     };
-    let principal_point_offset =
-        [sensor.float("principal_point_offset_x")?, sensor.float("principal_point_offset_y")?];
-    let spec = PerspectiveSpec { to_world, fov_deg, fov_axis, principal_point_offset, near_clip: near, far_clip: far };
+    let principal_point_offset = [
+        sensor.float("principal_point_offset_x")?,
+        sensor.float("principal_point_offset_y")?,
+    ];
+    let spec = PerspectiveSpec {
+        to_world,
+        fov_deg,
+        fov_axis,
+        principal_point_offset,
+        near_clip: near,
+        far_clip: far,
+    };
     Ok(Camera::perspective(&spec, film, center))
 }
 
 /// Diagonal field of view, in degrees, of a lens on 35 mm film (36 x 24 mm).
 fn fov_of_focal_length(sensor: &Props) -> Result<f64, SceneError> {
     let text = sensor.string("focal_length")?;
-    let number = text.strip_suffix("mm").unwrap_or(text).trim().parse::<f64>().ok();
-    let length = number.filter(|l| l.is_finite() && *l > 0.0).ok_or_else(|| {
-        let what = format!("\"{text}\" is no focal length");
-        sensor.error_at("focal_length", what).with_help("write millimetres, such as 50mm")
-    })?;
+    let number = text
+        .strip_suffix("mm")
+        .unwrap_or(text)
+        .trim()
+        .parse::<f64>()
+        .ok();
+    let length = number
+        .filter(|l| l.is_finite() && *l > 0.0)
+        .ok_or_else(|| {
+            let what = format!("\"{text}\" is no focal length");
+            sensor
+                .error_at("focal_length", what)
+                .with_help("write millimetres, such as 50mm")
+        })?;
     Ok(2.0 * (0.5 * 36f64.hypot(24.0) / length).atan().to_degrees())
 }

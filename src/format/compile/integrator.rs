@@ -1,7 +1,7 @@
 //! The integrator, and the layers that its wrappers ask for.
 
-use crate::format::plugins::Category;
 use super::suggest;
+use crate::format::plugins::Category;
 use crate::format::{Overrides, Props, SceneError};
 use crate::render::AovLayer;
 use crate::transport::aov::Aov;
@@ -48,20 +48,29 @@ pub fn integrator(
         match &mut spec {
             IntegratorSpec::Path(path) => path.max_depth = depth_limit(depth),
             IntegratorSpec::Direct(_) => {
-                let error = root.error("the integrator \"direct\" has no depth for the command line to set");
+                let error = root
+                    .error("the integrator \"direct\" has no depth for the command line to set");
                 return Err(error.with_help("leave --max-depth out, or give --integrator path"));
             }
         }
     }
     for name in &overrides.aovs {
         let Some((_, aov)) = LAYERS.iter().find(|(n, _)| n == name) else {
-            let error = root.error(format!("unknown layer \"{name}\" asked for on the command line"));
+            let error = root.error(format!(
+                "unknown layer \"{name}\" asked for on the command line"
+            ));
             return Err(error.with_help(suggest(name, LAYERS.map(|l| l.0))));
         };
-        layers.push(AovLayer { name: name.clone(), aov: *aov });
+        layers.push(AovLayer {
+            name: name.clone(),
+            aov: *aov,
+        });
     }
     if let Some(twice) = layers.iter().enumerate().find_map(|(i, l)| {
-        layers[..i].iter().any(|earlier| earlier.name == l.name).then_some(&l.name)
+        layers[..i]
+            .iter()
+            .any(|earlier| earlier.name == l.name)
+            .then_some(&l.name)
     }) {
         return Err(root.error(format!("two layers would have the name \"{twice}\"")));
     }
@@ -69,7 +78,11 @@ pub fn integrator(
 }
 
 fn default_path() -> IntegratorSpec {
-    IntegratorSpec::Path(PathSpec { max_depth: None, rr_depth: DEFAULT_RR_DEPTH, hide_emitters: false })
+    IntegratorSpec::Path(PathSpec {
+        max_depth: None,
+        rr_depth: DEFAULT_RR_DEPTH,
+        hide_emitters: false,
+    })
 }
 
 fn depth_limit(depth: i64) -> Option<u32> {
@@ -94,7 +107,10 @@ fn unwrap(props: &Props, layers: &mut Vec<AovLayer>) -> Result<Option<Integrator
         "direct" => direct(props, hide_emitters).map(Some),
         wrapper => {
             if wrapper == "moment" {
-                layers.push(AovLayer { name: "m2".to_string(), aov: Aov::SecondMoment });
+                layers.push(AovLayer {
+                    name: "m2".to_string(),
+                    aov: Aov::SecondMoment,
+                });
             } else {
                 aov_layers(props, layers)?;
             }
@@ -102,13 +118,20 @@ fn unwrap(props: &Props, layers: &mut Vec<AovLayer>) -> Result<Option<Integrator
             let mut inner = None;
             for (i, child) in nested.iter().enumerate() {
                 if i > 0 {
-                    let what = format!("several integrators inside \"{wrapper}\" are not supported");
+                    let what =
+                        format!("several integrators inside \"{wrapper}\" are not supported");
                     return Err(child.error(what).with_help("keep one of them"));
                 }
                 inner = unwrap(child, layers)?;
             }
-            if let Some(IntegratorSpec::Path(PathSpec { hide_emitters: hide, .. }))
-            | Some(IntegratorSpec::Direct(DirectSpec { hide_emitters: hide, .. })) = &mut inner
+            if let Some(IntegratorSpec::Path(PathSpec {
+                hide_emitters: hide,
+                ..
+            }))
+            | Some(IntegratorSpec::Direct(DirectSpec {
+                hide_emitters: hide,
+                ..
+            })) = &mut inner
             {
                 *hide |= hide_emitters;
             }
@@ -118,7 +141,10 @@ fn unwrap(props: &Props, layers: &mut Vec<AovLayer>) -> Result<Option<Integrator
 }
 
 fn direct(props: &Props, hide_emitters: bool) -> Result<IntegratorSpec, SceneError> {
-    let shared = props.is_given("shading_samples").then(|| props.int("shading_samples")).transpose()?;
+    let shared = props
+        .is_given("shading_samples")
+        .then(|| props.int("shading_samples"))
+        .transpose()?;
     let count = |name: &str| shared.map_or_else(|| props.int(name), Ok);
     let spec = DirectSpec {
         emitter_samples: count("emitter_samples")? as u32,
@@ -129,7 +155,9 @@ fn direct(props: &Props, hide_emitters: bool) -> Result<IntegratorSpec, SceneErr
         return Err(props.error("neither the emitters nor the BSDF would be sampled"));
     }
     if spec.emitter_samples.max(spec.bsdf_samples) > MAX_SPLIT {
-        return Err(props.error(format!("more than {MAX_SPLIT} samples per hit are not supported")));
+        return Err(props.error(format!(
+            "more than {MAX_SPLIT} samples per hit are not supported"
+        )));
     }
     Ok(IntegratorSpec::Direct(spec))
 }
@@ -138,16 +166,26 @@ fn direct(props: &Props, hide_emitters: bool) -> Result<IntegratorSpec, SceneErr
 const MAX_SPLIT: u32 = 1 << 16;
 
 fn aov_layers(props: &Props, layers: &mut Vec<AovLayer>) -> Result<(), SceneError> {
-    for part in props.string("aovs")?.split(',').map(str::trim).filter(|p| !p.is_empty()) {
+    for part in props
+        .string("aovs")?
+        .split(',')
+        .map(str::trim)
+        .filter(|p| !p.is_empty())
+    {
         let Some((name, kind)) = part.split_once(':') else {
             let what = format!("expected name:type, found \"{part}\"");
             return Err(props.error_at("aovs", what));
         };
         let Some((_, aov)) = TYPES.iter().find(|(n, _)| *n == kind.trim()) else {
             let what = format!("unknown type \"{kind}\" of output variable \"{name}\"");
-            return Err(props.error_at("aovs", what).with_help(suggest(kind, TYPES.map(|t| t.0))));
+            return Err(props
+                .error_at("aovs", what)
+                .with_help(suggest(kind, TYPES.map(|t| t.0))));
         };
-        layers.push(AovLayer { name: name.trim().to_string(), aov: *aov });
+        layers.push(AovLayer {
+            name: name.trim().to_string(),
+            aov: *aov,
+        });
     }
     Ok(())
 }
@@ -164,11 +202,15 @@ fn replaced(spec: IntegratorSpec, name: &str, root: &Props) -> Result<Integrator
             IntegratorSpec::Path(p) => IntegratorSpec::Path(PathSpec { hide_emitters, ..p }),
             other => other,
         }),
-        "direct" => {
-            Ok(IntegratorSpec::Direct(DirectSpec { emitter_samples: 1, bsdf_samples: 1, hide_emitters }))
-        }
+        "direct" => Ok(IntegratorSpec::Direct(DirectSpec {
+            emitter_samples: 1,
+            bsdf_samples: 1,
+            hide_emitters,
+        })),
         _ => {
-            let error = root.error(format!("unknown integrator \"{name}\" asked for on the command line"));
+            let error = root.error(format!(
+                "unknown integrator \"{name}\" asked for on the command line"
+            ));
             Err(error.with_help(suggest(name, NAMES)))
         }
     }

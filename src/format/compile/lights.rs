@@ -4,7 +4,7 @@ use super::materials::Materials;
 use crate::format::plugins::Category;
 use crate::format::{Props, RgbOrTexture, SceneError};
 use crate::geom::ShapeId;
-use crate::light::{EnvMap, Emitter};
+use crate::light::{Emitter, EnvMap};
 use crate::math::DVec3;
 
 pub fn lights(
@@ -17,8 +17,13 @@ pub fn lights(
     for (i, shape) in shapes.iter().enumerate() {
         for emitter in shape.children(Category::Emitter) {
             if emitter.plugin() != "area" {
-                let what = format!("a shape cannot be an emitter of type \"{}\"", emitter.plugin());
-                return Err(emitter.error(what).with_help("use \"area\", or put the emitter beside the shape"));
+                let what = format!(
+                    "a shape cannot be an emitter of type \"{}\"",
+                    emitter.plugin()
+                );
+                return Err(emitter
+                    .error(what)
+                    .with_help("use \"area\", or put the emitter beside the shape"));
             }
             ignore_weight(&emitter);
             let radiance = match emitter.rgb_or_texture("radiance")? {
@@ -26,12 +31,16 @@ pub fn lights(
                 RgbOrTexture::Texture(id) => {
                     let constant = materials.texture(id)?.as_constant();
                     constant.ok_or_else(|| {
-                        let error = emitter.error_at("radiance", "a textured radiance is not supported");
+                        let error =
+                            emitter.error_at("radiance", "a textured radiance is not supported");
                         error.with_help("give a single colour")
                     })?
                 }
             };
-            emitters.push(Emitter::Area { shape: ShapeId(i as u32), radiance });
+            emitters.push(Emitter::Area {
+                shape: ShapeId(i as u32),
+                radiance,
+            });
         }
     }
     let mut environment: Option<Props> = None;
@@ -48,14 +57,23 @@ pub fn lights(
         if let Some(first) = &environment {
             let what = {
                 let at = first.place();
-                format!("a second environment: the first is at {}:{}:{}", at.file.display(), at.line, at.column)
+                format!(
+                    "a second environment: the first is at {}:{}:{}",
+                    at.file.display(),
+                    at.line,
+                    at.column
+                )
             };
-            return Err(emitter.error(what).with_help("a scene has one environment at most"));
+            return Err(emitter
+                .error(what)
+                .with_help("a scene has one environment at most"));
         }
         emitters.push(match emitter.plugin() {
             "constant" => {
                 emitter.ignore(&["to_world"]);
-                Emitter::Constant { radiance: emitter.rgb("radiance")? }
+                Emitter::Constant {
+                    radiance: emitter.rgb("radiance")?,
+                }
             }
             _ => envmap(&emitter, materials)?,
         });
@@ -74,7 +92,10 @@ fn point(p: &Props, center: DVec3) -> Result<Emitter, SceneError> {
         true => p.transform("to_world")?.point(DVec3::ZERO),
         false => p.vec3("position")?,
     };
-    Ok(Emitter::Point { p: (position - center).as_vec3(), intensity: p.rgb("intensity")? })
+    Ok(Emitter::Point {
+        p: (position - center).as_vec3(),
+        intensity: p.rgb("intensity")?,
+    })
 }
 
 fn envmap(p: &Props, materials: &mut Materials) -> Result<Emitter, SceneError> {
@@ -82,6 +103,13 @@ fn envmap(p: &Props, materials: &mut Materials) -> Result<Emitter, SceneError> {
     let (width, height) = (picture.width as usize, picture.height as usize);
     // It changes the noise, not the picture.
     p.ignore(&["mis_compensation"]);
-    let map = EnvMap::new(picture.colors(), width, height, &p.transform("to_world")?, p.float("scale")? as f32);
-    map.map(Emitter::Image).map_err(|e| p.error_at("filename", e.to_string()))
+    let map = EnvMap::new(
+        picture.colors(),
+        width,
+        height,
+        &p.transform("to_world")?,
+        p.float("scale")? as f32,
+    );
+    map.map(Emitter::Image)
+        .map_err(|e| p.error_at("filename", e.to_string()))
 }

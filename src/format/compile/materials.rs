@@ -8,7 +8,9 @@ use glam::Affine2;
 
 use crate::bsdf::{Bsdf, Diffuse, Shape, metals};
 use crate::format::plugins::Category;
-use crate::format::{FloatOrTexture, ObjectId, Props, RgbOrTexture, SceneDesc, SceneError, did_you_mean};
+use crate::format::{
+    FloatOrTexture, ObjectId, Props, RgbOrTexture, SceneDesc, SceneError, did_you_mean,
+};
 use crate::image_io::{self, Encoding, Pixels};
 use crate::material::{Material, Metal, Roughness};
 use crate::math::{DVec3, Rgb, Transform, Vec2};
@@ -39,12 +41,27 @@ impl<'a> Materials<'a> {
 
     /// The materials by id; the plan says how many need a look-up.
     pub fn finish(self, plan: &mut Plan) -> Vec<Material> {
-        let varying = self.materials.iter().filter(|m| !matches!(m, Material::Uniform(_))).count();
+        let varying = self
+            .materials
+            .iter()
+            .filter(|m| !matches!(m, Material::Uniform(_)))
+            .count();
         if varying == 0 {
-            plan.add("textures", "none: every material is a set of numbers", "no texture varies");
+            plan.add(
+                "textures",
+                "none: every material is a set of numbers",
+                "no texture varies",
+            );
         } else {
-            let reason = format!("{varying} of {} materials vary over their surface", self.materials.len());
-            plan.add("textures", "looked up at every hit on these materials", reason);
+            let reason = format!(
+                "{varying} of {} materials vary over their surface",
+                self.materials.len()
+            );
+            plan.add(
+                "textures",
+                "looked up at every hit on these materials",
+                reason,
+            );
         }
         self.materials
     }
@@ -52,7 +69,10 @@ impl<'a> Materials<'a> {
     pub fn of_shape(&mut self, shape: &Props<'a>) -> Result<MaterialId, SceneError> {
         let Some(props) = shape.child(Category::Bsdf) else {
             let id = *self.default.get_or_insert_with(|| {
-                self.materials.push(Material::Uniform(Bsdf::Diffuse(Diffuse::new(Rgb::splat(DEFAULT_REFLECTANCE)))));
+                self.materials
+                    .push(Material::Uniform(Bsdf::Diffuse(Diffuse::new(Rgb::splat(
+                        DEFAULT_REFLECTANCE,
+                    )))));
                 MaterialId(self.materials.len() as u32 - 1)
             });
             return Ok(id);
@@ -74,7 +94,9 @@ impl<'a> Materials<'a> {
                 for side in &sides {
                     if matches!(side.plugin(), "dielectric" | "twosided") {
                         let what = format!("\"{}\" already has two sides", side.plugin());
-                        return Err(side.error(what).with_help("use it without \"twosided\" around it"));
+                        return Err(side
+                            .error(what)
+                            .with_help("use it without \"twosided\" around it"));
                     }
                 }
                 let [Some(first), last] = [sides.first(), sides.last()] else {
@@ -100,13 +122,22 @@ impl<'a> Materials<'a> {
                         }
                     }
                 };
-                let (alpha_u, alpha_v) = (along("alpha_u", "alpha_v")?, along("alpha_v", "alpha_u")?);
+                let (alpha_u, alpha_v) =
+                    (along("alpha_u", "alpha_v")?, along("alpha_v", "alpha_u")?);
                 let shape = match p.choice("distribution")? {
                     "ggx" => Shape::Ggx,
                     _ => Shape::Beckmann,
                 };
-                let roughness = Roughness { shape, alpha_u, alpha_v, visible: p.bool("sample_visible")? };
-                Material::RoughConductor { metal: self.metal(p)?, roughness }
+                let roughness = Roughness {
+                    shape,
+                    alpha_u,
+                    alpha_v,
+                    visible: p.bool("sample_visible")?,
+                };
+                Material::RoughConductor {
+                    metal: self.metal(p)?,
+                    roughness,
+                }
             }
             "dielectric" => {
                 let (inside, outside) = (p.ior("int_ior")?, p.ior("ext_ior")?);
@@ -116,7 +147,9 @@ impl<'a> Materials<'a> {
                     transmittance: self.color(p, "specular_transmittance")?,
                 }
             }
-            _ => Material::Diffuse { reflectance: self.color(p, "reflectance")? },
+            _ => Material::Diffuse {
+                reflectance: self.color(p, "reflectance")?,
+            },
         })
     }
 
@@ -124,7 +157,8 @@ impl<'a> Materials<'a> {
         let name = p.string("material")?;
         let known = metals::lookup(name).ok_or_else(|| {
             let help = did_you_mean(name, metals::names());
-            p.error_at("material", format!("no metal \"{name}\" is known")).with_help_opt(help)
+            p.error_at("material", format!("no metal \"{name}\" is known"))
+                .with_help_opt(help)
         });
         let mut given = |name: &str, known: Rgb| -> Result<Texture, SceneError> {
             match p.opt_rgb_or_texture(name)? {
@@ -133,7 +167,11 @@ impl<'a> Materials<'a> {
             }
         };
         let (eta, k) = known?;
-        Ok(Metal { eta: given("eta", eta)?, k: given("k", k)?, reflectance: self.color(p, "specular_reflectance")? })
+        Ok(Metal {
+            eta: given("eta", eta)?,
+            k: given("k", k)?,
+            reflectance: self.color(p, "specular_reflectance")?,
+        })
     }
 
     fn color(&mut self, p: &Props<'a>, name: &str) -> Result<Texture, SceneError> {
@@ -191,7 +229,10 @@ impl<'a> Materials<'a> {
         if let Texels::Floats(data) = &texels.texels
             && data.iter().flatten().any(|v| !v.is_finite())
         {
-            return Err(p.error_at("filename", "the image has values that are not finite numbers"));
+            return Err(p.error_at(
+                "filename",
+                "the image has values that are not finite numbers",
+            ));
         }
         let interpolation = match p.choice("filter_type")? {
             "nearest" => Interpolation::Nearest,
@@ -202,13 +243,19 @@ impl<'a> Materials<'a> {
             "clamp" => Wrap::Clamp,
             _ => Wrap::Repeat,
         };
-        Ok(Texture::Bitmap(Bitmap { texels, interpolation, wrap, to_uv }))
+        Ok(Texture::Bitmap(Bitmap {
+            texels,
+            interpolation,
+            wrap,
+            to_uv,
+        }))
     }
 
     /// The pixels of an environment map, linear.
     pub fn environment(&mut self, p: &Props) -> Result<Picture, SceneError> {
         let read = image_io::Bitmap::read(p.file("filename")?);
-        read.map(|b| picture(b, false)).map_err(|e| p.error_at("filename", e.to_string()))
+        read.map(|b| picture(b, false))
+            .map_err(|e| p.error_at("filename", e.to_string()))
     }
 }
 
@@ -221,15 +268,30 @@ fn picture(bitmap: image_io::Bitmap, raw: bool) -> Picture {
     let colors = if n >= 3 { [0, 1, 2] } else { [0; 3] };
     let srgb = bitmap.encoding == Encoding::Srgb && !raw;
     let texels = match &bitmap.pixels {
-        Pixels::U8(v) => {
-            Texels::Bytes { data: v.chunks_exact(n).map(|p| colors.map(|c| p[c])).collect(), srgb }
-        }
+        Pixels::U8(v) => Texels::Bytes {
+            data: v.chunks_exact(n).map(|p| colors.map(|c| p[c])).collect(),
+            srgb,
+        },
         Pixels::F32(v) => {
-            let decode = |v: f32| if srgb { image_io::color::srgb_to_linear(v) } else { v };
-            Texels::Floats(v.chunks_exact(n).map(|p| colors.map(|c| decode(p[c]))).collect())
+            let decode = |v: f32| {
+                if srgb {
+                    image_io::color::srgb_to_linear(v)
+                } else {
+                    v
+                }
+            };
+            Texels::Floats(
+                v.chunks_exact(n)
+                    .map(|p| colors.map(|c| decode(p[c])))
+                    .collect(),
+            )
         }
     };
-    Picture { width: bitmap.width as u32, height: bitmap.height as u32, texels }
+    Picture {
+        width: bitmap.width as u32,
+        height: bitmap.height as u32,
+        texels,
+    }
 }
 
 /// The part of a transform that acts on the first two coordinates.
@@ -238,4 +300,3 @@ fn affine2(t: &Transform) -> Affine2 {
     let flat = |v: DVec3| Vec2::new(v.x as f32, v.y as f32);
     Affine2::from_cols(flat(x), flat(y), flat(o))
 }
-

@@ -60,7 +60,10 @@ pub fn compile(desc: &SceneDesc, overrides: &Overrides) -> Result<Compiled, Scen
     let sampler = film::sampler(&sensor, overrides, &mut plan)?;
     let (integrator, mut aovs) = integrator::integrator(&root, overrides)?;
     if film.pixel_format.has_alpha() {
-        aovs.push(AovLayer { name: "A".to_string(), aov: Aov::Alpha });
+        aovs.push(AovLayer {
+            name: "A".to_string(),
+            aov: Aov::Alpha,
+        });
     }
 
     let shape_props = root.children(Category::Shape);
@@ -104,9 +107,13 @@ fn suggest<'a>(found: &str, names: impl IntoIterator<Item = &'a str> + Clone) ->
 fn the_sensor<'a>(root: &Props<'a>, warnings: &mut Vec<String>) -> Result<Props<'a>, SceneError> {
     let sensors = root.children(Category::Sensor);
     if sensors.len() > 1 {
-        warnings.push(format!("the scene has {} sensors: the first one is rendered", sensors.len()));
+        warnings.push(format!(
+            "the scene has {} sensors: the first one is rendered",
+            sensors.len()
+        ));
     }
     sensors.into_iter().next().ok_or_else(|| {
-        root.error("the scene has no sensor").with_help("add <sensor type=\"perspective\"> to say where to look from")
+        root.error("the scene has no sensor")
+            .with_help("add <sensor type=\"perspective\"> to say where to look from")
     })
 }

@@ -19,7 +19,10 @@ pub struct Source<'a> {
 
 enum Kind {
     /// `smooth`: compute vertex normals, as the file has none.
-    Mesh { data: MeshData, smooth: bool },
+    Mesh {
+        data: MeshData,
+        smooth: bool,
+    },
     Rectangle,
     Cube,
     Sphere,
@@ -36,7 +39,11 @@ pub fn read<'a>(props: &Props<'a>) -> Result<Source<'a>, SceneError> {
         "rectangle" | "cube" => {
             // Flat faces have the same normals either way.
             props.ignore(&["face_normals"]);
-            if props.plugin() == "cube" { Kind::Cube } else { Kind::Rectangle }
+            if props.plugin() == "cube" {
+                Kind::Cube
+            } else {
+                Kind::Rectangle
+            }
         }
         "sphere" => {
             let radius = scale(props, props.float("radius")?)?;
@@ -50,22 +57,37 @@ pub fn read<'a>(props: &Props<'a>) -> Result<Source<'a>, SceneError> {
         }
         _ => mesh(props, &to_world)?,
     };
-    Ok(Source { props: *props, kind, to_world, flip_normals: props.bool("flip_normals")? })
+    Ok(Source {
+        props: *props,
+        kind,
+        to_world,
+        flip_normals: props.bool("flip_normals")?,
+    })
 }
 
 fn scale(props: &Props, factor: f64) -> Result<Transform, SceneError> {
-    Transform::scale(DVec3::splat(factor)).ok_or_else(|| props.error_at("radius", "the radius is too small or too large"))
+    Transform::scale(DVec3::splat(factor))
+        .ok_or_else(|| props.error_at("radius", "the radius is too small or too large"))
 }
 
 /// The unit cylinder onto the one from `p0` to `p1`.
 fn along_axis(props: &Props) -> Result<Transform, SceneError> {
     let (p0, p1, radius) = (props.vec3("p0")?, props.vec3("p1")?, props.float("radius")?);
     let axis = p1 - p0;
-    let no_axis = || props.error_at("p1", "p0 and p1 are the same point, which gives the cylinder no axis");
+    let no_axis = || {
+        props.error_at(
+            "p1",
+            "p0 and p1 are the same point, which gives the cylinder no axis",
+        )
+    };
     let z = axis.try_normalize().ok_or_else(no_axis)?;
     let (x, y) = z.any_orthonormal_pair();
     // (x, y, z) must be right-handed.
-    let (x, y) = if x.cross(y).dot(z) > 0.0 { (x, y) } else { (y, x) };
+    let (x, y) = if x.cross(y).dot(z) > 0.0 {
+        (x, y)
+    } else {
+        (y, x)
+    };
     let (x, y) = (x * radius, y * radius);
     let rows = [
         [x.x, y.x, axis.x, p0.x],
@@ -73,7 +95,8 @@ fn along_axis(props: &Props) -> Result<Transform, SceneError> {
         [x.z, y.z, axis.z, p0.z],
         [0.0, 0.0, 0.0, 1.0],
     ];
-    Transform::from_rows(rows).ok_or_else(|| props.error_at("radius", "the radius is too small for the length"))
+    Transform::from_rows(rows)
+        .ok_or_else(|| props.error_at("radius", "the radius is too small for the length"))
 }
 
 /// A mesh from a file, its positions and normals taken to the world.
@@ -111,14 +134,21 @@ fn mesh(props: &Props, to_world: &Transform) -> Result<Kind, SceneError> {
 fn bounds(source: &Source) -> (DVec3, DVec3) {
     if let Kind::Mesh { data, .. } = &source.kind {
         let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        return data.positions.iter().fold(start, |(lo, hi), p| (lo.min(*p), hi.max(*p)));
+        return data
+            .positions
+            .iter()
+            .fold(start, |(lo, hi), p| (lo.min(*p), hi.max(*p)));
     }
     // A box around every one of the canonical shapes.
     let corner = |i: u32| {
         let sign = |bit: u32| if i >> bit & 1 == 0 { -1.0 } else { 1.0 };
         source.to_world.point(DVec3::new(sign(0), sign(1), sign(2)))
     };
-    (0..8).map(corner).fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), p| (lo.min(p), hi.max(p)))
+    (0..8)
+        .map(corner)
+        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), p| {
+            (lo.min(p), hi.max(p))
+        })
 }
 
 /// Distance of the scene from the origin, in radii of the scene, up to which its coordinates stay as they
@@ -128,31 +158,65 @@ const NEAR_ORIGIN: f64 = 4.0;
 /// Chooses the centre and makes the shapes relative to it.
 pub fn place(sources: Vec<Source>, plan: &mut Plan) -> Result<(Vec<Geometry>, DVec3), SceneError> {
     let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    let (lo, hi) =
-        sources.iter().map(bounds).fold(start, |(lo, hi), (l, h)| (lo.min(l), hi.max(h)));
+    let (lo, hi) = sources
+        .iter()
+        .map(bounds)
+        .fold(start, |(lo, hi), (l, h)| (lo.min(l), hi.max(h)));
     let middle = 0.5 * (lo + hi);
     let radius = 0.5 * (hi - lo).length();
-    let center = if sources.is_empty() || middle.length() <= NEAR_ORIGIN * radius { DVec3::ZERO } else { middle };
-    if center == DVec3::ZERO {
-        plan.add("coordinates", "as they are", "the scene lies near the origin");
+    let center = if sources.is_empty() || middle.length() <= NEAR_ORIGIN * radius {
+        DVec3::ZERO
     } else {
-        let reason = format!("the scene lies {:.3e} of its radii from the origin", middle.length() / radius);
-        plan.add("coordinates", format!("relative to ({}, {}, {})", center.x, center.y, center.z), reason);
+        middle
+    };
+    if center == DVec3::ZERO {
+        plan.add(
+            "coordinates",
+            "as they are",
+            "the scene lies near the origin",
+        );
+    } else {
+        let reason = format!(
+            "the scene lies {:.3e} of its radii from the origin",
+            middle.length() / radius
+        );
+        plan.add(
+            "coordinates",
+            format!("relative to ({}, {}, {})", center.x, center.y, center.z),
+            reason,
+        );
     }
-    let shapes: Result<Vec<_>, _> = sources.into_par_iter().map(|s| geometry(s, center)).collect();
+    let shapes: Result<Vec<_>, _> = sources
+        .into_par_iter()
+        .map(|s| geometry(s, center))
+        .collect();
     Ok((shapes?, center))
 }
 
 fn geometry(source: Source, center: DVec3) -> Result<Geometry, SceneError> {
-    let Source { props, kind, to_world, flip_normals } = source;
+    let Source {
+        props,
+        kind,
+        to_world,
+        flip_normals,
+    } = source;
     let to_scene = Transform::translate(-center) * to_world;
     let refused = |what: &str| {
-        props.error_at("to_world", what).with_help("use a uniform scale, or a mesh of the shape")
+        props
+            .error_at("to_world", what)
+            .with_help("use a uniform scale, or a mesh of the shape")
     };
     Ok(match kind {
         Kind::Mesh { data, smooth } => {
-            let positions: Vec<Vec3> = data.positions.iter().map(|p| (*p - center).as_vec3()).collect();
-            let (normals, uvs) = (data.normals.unwrap_or_default(), data.uvs.unwrap_or_default());
+            let positions: Vec<Vec3> = data
+                .positions
+                .iter()
+                .map(|p| (*p - center).as_vec3())
+                .collect();
+            let (normals, uvs) = (
+                data.normals.unwrap_or_default(),
+                data.uvs.unwrap_or_default(),
+            );
             let mut mesh = Mesh::new(positions, normals, uvs, data.indices, flip_normals)
                 .map_err(|e| props.error_at("filename", e.to_string()))?;
             if smooth {
@@ -162,13 +226,16 @@ fn geometry(source: Source, center: DVec3) -> Result<Geometry, SceneError> {
         }
         Kind::Rectangle => Geometry::Mesh(Mesh::rectangle(&to_scene, flip_normals)),
         Kind::Cube => Geometry::Mesh(Mesh::cube(&to_scene, flip_normals)),
-        Kind::Sphere => Geometry::Sphere(
-            Sphere::new(to_scene, flip_normals)
-                .ok_or_else(|| refused("the transform makes the sphere an ellipsoid, which is not supported"))?,
-        ),
-        Kind::Disk => Geometry::Disk(Disk::new(to_scene, flip_normals)),
-        Kind::Cylinder => Geometry::Cylinder(Cylinder::new(to_scene, flip_normals).ok_or_else(|| {
-            refused("the transform makes the cylinder elliptic or oblique, which is not supported")
+        Kind::Sphere => Geometry::Sphere(Sphere::new(to_scene, flip_normals).ok_or_else(|| {
+            refused("the transform makes the sphere an ellipsoid, which is not supported")
         })?),
+        Kind::Disk => Geometry::Disk(Disk::new(to_scene, flip_normals)),
+        Kind::Cylinder => {
+            Geometry::Cylinder(Cylinder::new(to_scene, flip_normals).ok_or_else(|| {
+                refused(
+                    "the transform makes the cylinder elliptic or oblique, which is not supported",
+                )
+            })?)
+        }
     })
 }
