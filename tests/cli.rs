@@ -236,6 +236,69 @@ fn a_wrong_scene_exits_with_1_and_writes_nothing() {
     assert_eq!(folder.files(), ["bad.xml"]);
 }
 
+/// What a scene may ask for that cannot be: each ends in one clear error, never in a file or a panic.
+#[test]
+fn impossible_scenes_exit_with_1_and_write_nothing() {
+    let folder = Folder::new("impossible");
+    folder.write("empty.obj", "# nothing\n");
+    folder.write(
+        "loop.xml",
+        r#"<scene version="3.0.0"><include filename="loop.xml"/></scene>"#,
+    );
+    let with = |body: &str| SMALL.replace("<emitter", &format!("{body}<emitter"));
+    let cases = [
+        (
+            SMALL.replace(r#"value="20""#, r#"value="1000000""#),
+            "\"width\" must be an integer from 1 to 65536, not 1000000",
+        ),
+        (
+            SMALL
+                .replace(r#"value="20""#, r#"value="60000""#)
+                .replace(r#"value="10""#, r#"value="60000""#),
+            "3600000000 pixels are more than a picture can have (268435456)",
+        ),
+        (
+            SMALL.replace(r#"value="4""#, r#"value="0""#),
+            "\"sample_count\" must be an integer of at least 1, not 0",
+        ),
+        (
+            SMALL.replace(
+                "<film",
+                r#"<transform name="to_world"><scale x="0"/></transform><film"#,
+            ),
+            "scaling by (0, 1, 1) cannot be undone",
+        ),
+        (
+            with(r#"<shape type="obj"><string name="filename" value="empty.obj"/></shape>"#),
+            "the mesh has no triangles",
+        ),
+        (
+            with(r#"<include filename="loop.xml"/>"#),
+            "too many includes, at \"loop.xml\"",
+        ),
+        (
+            with(r#"<emitter type="envmap"><string name="filename" value="empty.obj"/></emitter>"#),
+            "cannot read",
+        ),
+        (
+            r#"<scene version="3.0.0"/>"#.to_string(),
+            "the scene has no sensor",
+        ),
+        ("<scene".to_string(), ""),
+        (String::new(), ""),
+    ];
+    for (xml, expected) in cases {
+        folder.write("bad.xml", &xml);
+        let output = luxel(&folder.0, &["render", "bad.xml"]);
+        let said = stderr(&output);
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(said.starts_with("error: "), "{said}");
+        assert_eq!(said.matches("error: ").count(), 1, "{said}");
+        assert!(said.contains(expected), "{said}");
+    }
+    assert_eq!(folder.files(), ["bad.xml", "empty.obj", "loop.xml"]);
+}
+
 #[test]
 fn an_unwritable_output_exits_with_3_before_rendering() {
     let folder = Folder::new("unwritable");

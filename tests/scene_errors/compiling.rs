@@ -1,98 +1,327 @@
+//! What is found wrong only when the scene is built: values that contradict each other or cannot be rendered.
+
 use super::*;
-fn compiled(dir: &std::path::Path, xml: &str, overrides: &format::Overrides) -> String {
-    let desc = match format::load_str("a.xml", xml, dir, &[]) { Ok(d) => d, Err(e) => return format!("AT LOAD {e}") };
-    match format::compile(&desc, overrides) { Ok(c) => format!("OK {:?}", c.warnings), Err(e) => e.to_string() }
+
+fn building(body: &str) -> String {
+    building_in(Path::new("nowhere"), body, &Overrides::default())
 }
+
 #[test]
-fn explore() {
-    let dir = folder("compiling");
-    fs::write(dir.join("a.png"), b"\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR").unwrap();
-    let mut image = luxel::image_io::Image::from_rgb(2, 2, &[luxel::math::Rgb::WHITE; 4]);
-    image.write(dir.join("good.exr")).unwrap();
-    let bytes = fs::read(dir.join("good.exr")).unwrap();
-    fs::write(dir.join("cut.exr"), &bytes[..bytes.len() / 2]).unwrap();
-    image = luxel::image_io::Image::from_rgb(2, 2, &[luxel::math::Rgb::splat(f32::NAN); 4]);
-    image.write(dir.join("nan.exr")).unwrap();
-    image = luxel::image_io::Image::from_rgb(2, 2, &[luxel::math::Rgb::splat(-1.0); 4]);
-    image.write(dir.join("neg.exr")).unwrap();
-    fs::write(dir.join("empty.png"), b"").unwrap();
-    let s = "<sensor type='perspective'/>";
-    let sensor = |b: &str| format!("<sensor type='perspective'>{b}</sensor>");
-    let film = |b: &str| sensor(&format!("<film type='hdrfilm'>{b}</film>"));
-    let sphere = |b: &str| format!("{s}\n<shape type='sphere'>{b}</shape>");
-    let tex = |n: &str| sphere(&format!("<bsdf type='diffuse'>\n<texture type='bitmap' name='reflectance'><string name='filename' value='{n}'/></texture></bsdf>"));
-    let env = |n: &str| format!("{s}\n<emitter type='envmap'><string name='filename' value='{n}'/></emitter>");
-    let aov = |a: &str| format!("{s}\n<integrator type='aov'><string name='aovs' value='{a}'/></integrator>");
-    for body in ["".to_string(),
-      film("<integer name='crop_offset_x' value='700'/><integer name='crop_width' value='100'/>"),
-      film("<integer name='crop_width' value='0'/>"),
-      film("<integer name='width' value='1000000'/><integer name='height' value='1000000'/>"),
-      film("<integer name='width' value='65536'/><integer name='height' value='65536'/>"),
-      film("<integer name='width' value='0'/>"),
-      film("<string name='component_format' value='uint32'/>"),
-      sensor("<float name='near_clip' value='2'/><float name='far_clip' value='1'/>"),
-      sensor("<float name='near_clip' value='2'/><float name='far_clip' value='2'/>"),
-      sensor("<float name='near_clip' value='0'/>"),
-      sensor("<float name='shutter_open' value='2'/><float name='shutter_close' value='1'/>"),
-      sensor("<string name='focal_length' value='long'/>"),
-      sensor("<string name='focal_length' value='0mm'/>"),
-      sensor("<float name='fov' value='180'/>"),
-      sensor("<transform name='to_world'><scale value='2'/></transform>"),
-      sensor("<transform name='to_world'><scale value='0'/></transform>"),
-      sensor("<transform name='to_world'><scale x='-1'/></transform>"),
-      sensor("<transform name='to_world'><lookat origin='0,0,0' target='0,0,0' up='0,1,0'/></transform>"),
-      sensor("<transform name='to_world'><lookat origin='0,0,0' target='0,1,0' up='0,1,0'/></transform>"),
-      sensor("<transform name='to_world'><matrix value='1 0 0 0 0 1 0 0 0 0 0 0 0 0 0 1'/></transform>"),
-      sensor("<sampler type='sobol'><integer name='sample_count' value='0'/></sampler>"),
-      format!("{s}\n<emitter type='constant'/>\n<emitter type='constant'/>"),
-      sphere("<bsdf type='conductor'><string name='material' value='Agg'/></bsdf>"),
-      sphere("<bsdf type='conductor'><string name='material' value='unobtainium'/></bsdf>"),
-      sphere("<bsdf type='roughconductor'><float name='alpha_u' value='0.1'/></bsdf>"),
-      sphere("<bsdf type='twosided'><bsdf type='dielectric'/></bsdf>"),
-      sphere("<transform name='to_world'><scale x='2'/></transform>"),
-      sphere("<transform name='to_world'><scale value='0'/></transform>"),
-      sphere("<float name='radius' value='1e-300'/>"),
-      sphere("<float name='radius' value='1e-30'/>"),
-      sphere("<float name='radius' value='1e30'/>"),
-      sphere("<point name='center' x='1e30' y='0' z='0'/>"),
-      sphere("<point name='center' x='1e300' y='0' z='0'/>"),
-      sphere("<emitter type='constant'/>"),
-      sphere("<emitter type='point'/>"),
-      sphere("<emitter type='area'><texture type='checkerboard' name='radiance'/></emitter>"),
-      format!("{s}\n<shape type='cylinder'><transform name='to_world'><scale x='2'/></transform></shape>"),
-      format!("{s}\n<shape type='cylinder'><point name='p1' x='0' y='0' z='0'/></shape>"),
-      format!("{s}\n<shape type='cylinder'><float name='radius' value='1e-300'/></shape>"),
-      format!("{s}\n<shape type='disk'><transform name='to_world'><scale x='0'/></transform></shape>"),
-      format!("{s}\n<shape type='cube'><transform name='to_world'><translate x='1e300'/></transform></shape>"),
-      format!("{s}\n<shape type='cube'><transform name='to_world'><translate x='1e39'/></transform></shape>"),
-      format!("{s}\n<shape type='cube'><transform name='to_world'><scale value='1e39'/></transform></shape>"),
-      format!("{s}\n<shape type='cube'/><shape type='cube'><transform name='to_world'><translate x='1e39'/></transform></shape>"),
-      format!("{s}\n<shape type='cube'/><emitter type='constant'><float name='radiance' value='1e39'/></emitter>"),
-      format!("{s}\n<emitter type='point'><float name='intensity' value='1e39'/></emitter>"),
-      format!("{s}\n<emitter type='point'><point name='position' x='1e300' y='0' z='0'/></emitter>"),
-      tex("a.png"), tex("cut.exr"), tex("nan.exr"), tex("neg.exr"), tex("missing.exr"), tex("empty.png"),
-      env("a.png"), env("cut.exr"), env("nan.exr"), env("neg.exr"), env("missing.exr"),
-      aov("depth"), aov("d:deepth"), aov("d:depth,d:uv"), aov(":depth"), aov("d:dp_du"), aov("spp:depth"), aov("stderr:depth"), aov("d:"), aov(","), aov(""), aov("a.b:uv"),
-      format!("{s}\n<integrator type='aov'><string name='aovs' value='a:uv'/>\n<integrator type='path'/>\n<integrator type='path'/></integrator>"),
-      format!("{s}\n<integrator type='direct'><integer name='shading_samples' value='0'/></integrator>"),
-      format!("{s}\n<integrator type='direct'><integer name='shading_samples' value='100000'/></integrator>"),
-      format!("{s}\n<integrator type='path'><float name='timeout' value='3'/></integrator>"),
-    ] {
-        let xml = format!("<scene version='3.0.0'>\n{body}\n</scene>");
-        println!("=== {body}\n{}", compiled(&dir, &xml, &Default::default()).replace(dir.to_str().unwrap(), "DIR"));
-    }
-    let d = format::Overrides::default;
-    for o in [
-      format::Overrides { integrator: Some("pahth".into()), ..d() },
-      format::Overrides { sampler: Some("halton".into()), ..d() },
-      format::Overrides { aovs: vec!["albdo".into()], ..d() },
-      format::Overrides { aovs: vec!["uv".into(), "uv".into()], ..d() },
-      format::Overrides { integrator: Some("direct".into()), max_depth: Some(3), ..d() },
-      format::Overrides { resolution: Some([1_000_000, 1_000_000]), ..d() },
-      format::Overrides { resolution: Some([0, 10]), ..d() },
-      format::Overrides { crop: Some(luxel::film::Window { x: 760, y: 0, width: 20, height: 20 }), ..d() },
-    ] {
-        println!("=== {o:?}\n{}", compiled(&dir, &format!("<scene version='3.0.0'>{s}</scene>"), &o));
-    }
-    println!("{}", compiled(&dir, &format!("<scene version='3.0.0'>{}</scene>", film("<integer name='crop_width' value='10'/>")), &format::Overrides { resolution: Some([10, 10]), ..d() }));
+fn film_and_camera() {
+    says(
+        building(""),
+        r#"
+a.xml:1:1: the scene has no sensor
+  <scene version='3.0.0'>
+  ^
+  help: add <sensor type="perspective"> to say where to look from"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'><film type='hdrfilm'>\n<integer name='crop_offset_x' value='700'/><integer name='crop_width' value='100'/></film></sensor>",
+        ),
+        r#"
+a.xml:2:34: the crop window of 100 x 576 pixels at (700, 0) does not lie within the picture of 768 x 576
+  <sensor type='perspective'><film type='hdrfilm'>
+                                   ^"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'><film type='hdrfilm'>\n<integer name='width' value='65536'/><integer name='height' value='65536'/></film></sensor>",
+        ),
+        r#"
+a.xml:2:34: 4294967296 pixels are more than a picture can have (268435456)
+  <sensor type='perspective'><film type='hdrfilm'>
+                                   ^"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'><film type='hdrfilm'>\n<string name='component_format' value='uint32'/></film></sensor>",
+        ),
+        r#"
+a.xml:3:33: component_format "uint32" is not supported
+  <string name='component_format' value='uint32'/></film></sensor>
+                                  ^
+  help: use "float32" or "float16""#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'>\n<float name='near_clip' value='2'/><float name='far_clip' value='1'/></sensor>",
+        ),
+        r#"
+a.xml:3:25: near_clip 2 is not below far_clip 1
+  <float name='near_clip' value='2'/><float name='far_clip' value='1'/></sensor>
+                          ^"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'>\n<float name='shutter_open' value='2'/><float name='shutter_close' value='1'/></sensor>",
+        ),
+        r#"
+a.xml:3:28: the shutter closes before it opens
+  <float name='shutter_open' value='2'/><float name='shutter_close' value='1'/></sensor>
+                             ^"#,
+    );
+    says(
+        building("<sensor type='perspective'>\n<string name='focal_length' value='0mm'/></sensor>"),
+        r#"
+a.xml:3:29: "0mm" is no focal length
+  <string name='focal_length' value='0mm'/></sensor>
+                              ^
+  help: write millimetres, such as 50mm"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'>\n<transform name='to_world'><scale value='2'/></transform></sensor>",
+        ),
+        r#"
+a.xml:3:1: the transform of a camera must not scale
+  <transform name='to_world'><scale value='2'/></transform></sensor>
+  ^
+  help: leave <scale> out: fov says how much the camera sees"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'>\n<transform name='to_world'><translate x='1e30'/></transform></sensor>",
+        ),
+        r#"
+a.xml:3:1: the camera lies more than 1e15 from the origin, too far to be rendered
+  <transform name='to_world'><translate x='1e30'/></transform></sensor>
+  ^"#,
+    );
+}
+
+#[test]
+fn shapes() {
+    says(
+        building(
+            "<sensor type='perspective'/>\n<shape type='sphere'><transform name='to_world'><scale x='2'/></transform></shape>",
+        ),
+        r#"
+a.xml:3:22: the transform makes the sphere an ellipsoid, which is not supported
+  <shape type='sphere'><transform name='to_world'><scale x='2'/></transform></shape>
+                       ^
+  help: use a uniform scale, or a mesh of the shape"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<shape type='sphere'><transform name='to_world'><translate x='1e30'/></transform></shape>",
+        ),
+        r#"
+a.xml:3:22: a part of the shape lies more than 1e15 from the origin, too far to be rendered
+  <shape type='sphere'><transform name='to_world'><translate x='1e30'/></transform></shape>
+                       ^"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<shape type='cylinder'><transform name='to_world'><scale x='2'/></transform></shape>",
+        ),
+        r#"
+a.xml:3:24: the transform makes the cylinder elliptic or oblique, which is not supported
+  <shape type='cylinder'><transform name='to_world'><scale x='2'/></transform></shape>
+                         ^
+  help: use a uniform scale, or a mesh of the shape"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<shape type='cylinder'><point name='p1' x='0' y='0' z='0'/></shape>",
+        ),
+        r#"
+a.xml:3:41: p0 and p1 are the same point, which gives the cylinder no axis
+  <shape type='cylinder'><point name='p1' x='0' y='0' z='0'/></shape>
+                                          ^"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<shape type='cylinder'><float name='radius' value='1e-300'/></shape>",
+        ),
+        r#"
+a.xml:3:45: the radius is too small for the length
+  <shape type='cylinder'><float name='radius' value='1e-300'/></shape>
+                                              ^"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<shape type='sphere'><float name='radius' value='1e-300'/></shape>",
+        ),
+        r#"
+a.xml:3:43: the radius is too small or too large
+  <shape type='sphere'><float name='radius' value='1e-300'/></shape>
+                                            ^"#,
+    );
+}
+
+#[test]
+fn materials() {
+    says(
+        building(
+            "<sensor type='perspective'/>\n<shape type='sphere'><bsdf type='conductor'><string name='material' value='Agg'/></bsdf></shape>",
+        ),
+        r#"
+a.xml:3:69: no metal "Agg" is known
+  <shape type='sphere'><bsdf type='conductor'><string name='material' value='Agg'/></bsdf></shape>
+                                                                      ^
+  help: did you mean "Ag"?"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<shape type='sphere'><bsdf type='roughconductor'><float name='alpha_u' value='0.1'/></bsdf></shape>",
+        ),
+        r#"
+a.xml:3:28: alpha_u and alpha_v come together
+  <shape type='sphere'><bsdf type='roughconductor'><float name='alpha_u' value='0.1'/></bsdf></shape>
+                             ^
+  help: give both, or alpha alone"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<shape type='sphere'><bsdf type='twosided'><bsdf type='dielectric'/></bsdf></shape>",
+        ),
+        r#"
+a.xml:3:50: "dielectric" already has two sides
+  <shape type='sphere'><bsdf type='twosided'><bsdf type='dielectric'/></bsdf></shape>
+                                                   ^
+  help: use it without "twosided" around it"#,
+    );
+}
+
+#[test]
+fn emitters() {
+    says(
+        building(
+            "<sensor type='perspective'/>\n<emitter type='constant'/>\n<emitter type='constant'/>",
+        ),
+        r#"
+a.xml:4:10: a second environment: the first is at a.xml:3:10
+  <emitter type='constant'/>
+           ^
+  help: a scene has one environment at most"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<shape type='sphere'><emitter type='constant'/></shape>",
+        ),
+        r#"
+a.xml:3:31: a shape cannot be an emitter of type "constant"
+  <shape type='sphere'><emitter type='constant'/></shape>
+                                ^
+  help: use "area", or put the emitter beside the shape"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<shape type='sphere'><emitter type='area'><texture type='checkerboard' name='radiance'/></emitter></shape>",
+        ),
+        r#"
+a.xml:3:72: a textured radiance is not supported
+  <shape type='sphere'><emitter type='area'><texture type='checkerboard' name='radiance'/></emitter></shape>
+                                                                         ^
+  help: give a single colour"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<emitter type='point'><point name='position' x='1e30' y='0' z='0'/></emitter>",
+        ),
+        r#"
+a.xml:3:46: the emitter lies more than 1e15 from the origin, too far to be rendered
+  <emitter type='point'><point name='position' x='1e30' y='0' z='0'/></emitter>
+                                               ^"#,
+    );
+}
+
+#[test]
+fn integrators() {
+    says(
+        building(
+            "<sensor type='perspective'/>\n<integrator type='aov'><string name='aovs' value='depth'/></integrator>",
+        ),
+        r#"
+a.xml:3:44: expected name:type, found "depth"
+  <integrator type='aov'><string name='aovs' value='depth'/></integrator>
+                                             ^"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<integrator type='aov'><string name='aovs' value='d:deepth'/></integrator>",
+        ),
+        r#"
+a.xml:3:44: unknown type "deepth" of output variable "d"
+  <integrator type='aov'><string name='aovs' value='d:deepth'/></integrator>
+                                             ^
+  help: did you mean "depth"?"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<integrator type='aov'><string name='aovs' value='d:dp_du'/></integrator>",
+        ),
+        r#"
+a.xml:3:44: output variable "dp_du" is not supported
+  <integrator type='aov'><string name='aovs' value='d:dp_du'/></integrator>
+                                             ^
+  help: there are "albedo", "sh_normal", "geo_normal", "depth", "position", "uv", "shape_index" and "prim_index""#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<integrator type='aov'><string name='aovs' value='d:depth, d:uv'/></integrator>",
+        ),
+        r#"
+a.xml:3:44: two layers would have the name "d"
+  <integrator type='aov'><string name='aovs' value='d:depth, d:uv'/></integrator>
+                                             ^"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<integrator type='aov'><string name='aovs' value=':depth'/></integrator>",
+        ),
+        r#"
+a.xml:3:44: an output variable has no name
+  <integrator type='aov'><string name='aovs' value=':depth'/></integrator>
+                                             ^"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<integrator type='aov'><string name='aovs' value='spp:depth'/></integrator>",
+        ),
+        r#"
+a.xml:3:44: "spp" is the name of a layer that every picture has
+  <integrator type='aov'><string name='aovs' value='spp:depth'/></integrator>
+                                             ^"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<integrator type='aov'><string name='aovs' value='a:uv'/>\n<integrator type='path'/>\n<integrator type='path'/></integrator>",
+        ),
+        r#"
+a.xml:5:13: several integrators inside "aov" are not supported
+  <integrator type='path'/></integrator>
+              ^
+  help: keep one of them"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<integrator type='direct'><integer name='shading_samples' value='0'/></integrator>",
+        ),
+        r#"
+a.xml:3:13: neither the emitters nor the BSDF would be sampled
+  <integrator type='direct'><integer name='shading_samples' value='0'/></integrator>
+              ^"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<integrator type='direct'><integer name='shading_samples' value='100000'/></integrator>",
+        ),
+        r#"
+a.xml:3:13: more than 65536 samples per hit are not supported
+  <integrator type='direct'><integer name='shading_samples' value='100000'/></integrator>
+              ^"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<integrator type='path'><float name='timeout' value='3'/></integrator>",
+        ),
+        r#"
+a.xml:3:47: a timeout in the scene is not supported
+  <integrator type='path'><float name='timeout' value='3'/></integrator>
+                                                ^
+  help: use --time to limit the time"#,
+    );
 }

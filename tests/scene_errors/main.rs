@@ -3,11 +3,12 @@
 mod compiling;
 mod files;
 mod language;
+mod outside;
 mod values;
 
-use luxel::format::{self, Category, SceneDesc, SceneError};
+use luxel::format::{self, Category, Overrides, SceneDesc, SceneError};
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A fresh folder for the files of one test.
 fn folder(test: &str) -> PathBuf {
@@ -41,6 +42,15 @@ fn step(step: &str) -> String {
     in_sphere(&format!(
         "<transform name=\"to_world\">\n{step}\n</transform>"
     ))
+}
+
+/// The error of building what stands inside a scene, which begins on line 2; files are looked for in `dir`.
+fn building_in(dir: &Path, body: &str, overrides: &Overrides) -> String {
+    let xml = format!("<scene version='3.0.0'>\n{body}\n</scene>");
+    let desc = format::load_str("a.xml", &xml, dir, &[]);
+    let error = desc.and_then(|d| format::compile(&d, overrides).map(|_| ()));
+    let text = error.expect_err(body).to_string();
+    text.replace(&dir.display().to_string(), "DIR")
 }
 
 /// Compares an error with its text, which begins on a line of its own.

@@ -135,6 +135,13 @@ a.xml:3:22: "nan" is not a finite number
                        ^"#,
     );
     says(
+        in_sphere("<float name='radius' value='1e39'/>"),
+        r#"
+a.xml:3:22: "1e39" is too large: numbers reach to 3.4e38
+  <float name='radius' value='1e39'/>
+                       ^"#,
+    );
+    says(
         in_sphere("<float name='radius' value='1e999'/>"),
         r#"
 a.xml:3:22: "1e999" is not a finite number
@@ -311,11 +318,11 @@ a.xml:4:1: unknown element <float> in <transform>
   help: a transform is made of "translate", "scale", "rotate", "lookat" and "matrix""#,
     );
     says(
-        step("<scale value='1e200'/><scale value='1e200'/>"),
+        step(&"<scale value='1e38'/>\n".repeat(9)),
         r#"
-a.xml:4:8: scaling by (1e200, 1e200, 1e200) cannot be undone
-  <scale value='1e200'/><scale value='1e200'/>
-         ^"#,
+a.xml:8:1: the transform up to here is singular or overflows
+  <scale value='1e38'/>
+  ^"#,
     );
 }
 

@@ -8,7 +8,7 @@ use crate::render::{ComponentFormat, PixelFormat};
 use crate::sampler::SamplerKind;
 use crate::scene::{Camera, FovAxis, PerspectiveSpec, Plan};
 
-use super::{on_command_line, suggest};
+use super::{on_command_line, out_of_reach, suggest, within_reach};
 
 /// Most pixels of a picture: beyond, film and files would not fit into memory.
 const MAX_PIXELS: u64 = 1 << 28;
@@ -67,8 +67,10 @@ pub fn film(sensor: &Props, overrides: &Overrides) -> Result<Film, SceneError> {
     if let Some(resolution) = overrides.resolution {
         if crop.is_some() && overrides.crop.is_none() {
             let what = "the film has a crop window, which a new resolution makes meaningless";
-            return Err(film_error(props.as_ref().unwrap_or(sensor), overrides, what)
-                .with_help("give --crop too"));
+            return Err(
+                film_error(props.as_ref().unwrap_or(sensor), overrides, what)
+                    .with_help("give --crop too"),
+            );
         }
         size = resolution;
     }
@@ -225,6 +227,9 @@ pub fn camera(sensor: &Props, film: &FilmSpec, center: DVec3) -> Result<Camera, 
             let error = sensor.error_at("to_world", "the transform of a camera must not scale");
             return Err(error.with_help("leave <scale> out: fov says how much the camera sees"));
         }
+    }
+    if !within_reach(to_world.point(DVec3::ZERO)) {
+        return Err(sensor.error_at("to_world", out_of_reach("the camera")));
     }
     let (near, far) = (sensor.float("near_clip")?, sensor.float("far_clip")?);
     if near >= far {

@@ -63,21 +63,11 @@ pub fn integrator(
     for name in &overrides.aovs {
         let Some((_, aov)) = LAYERS.iter().find(|(n, _)| n == name) else {
             let what = format!("unknown layer \"{name}\"");
-            return Err(on_command_line("--aov", name, what)
-                .with_help(suggest(name, LAYERS.map(|l| l.0))));
+            return Err(
+                on_command_line("--aov", name, what).with_help(suggest(name, LAYERS.map(|l| l.0)))
+            );
         };
-        layers.push(AovLayer {
-            name: name.clone(),
-            aov: *aov,
-        });
-    }
-    if let Some(twice) = layers.iter().enumerate().find_map(|(i, l)| {
-        layers[..i]
-            .iter()
-            .any(|earlier| earlier.name == l.name)
-            .then_some(&l.name)
-    }) {
-        return Err(root.error(format!("two layers would have the name \"{twice}\"")));
+        add_layer(&mut layers, name, *aov).map_err(|what| on_command_line("--aov", name, what))?;
     }
     Ok((spec, layers))
 }
@@ -112,10 +102,7 @@ fn unwrap(props: &Props, layers: &mut Vec<AovLayer>) -> Result<Option<Integrator
         "direct" => direct(props, hide_emitters).map(Some),
         wrapper => {
             if wrapper == "moment" {
-                layers.push(AovLayer {
-                    name: "m2".to_string(),
-                    aov: Aov::SecondMoment,
-                });
+                add_layer(layers, "m2", Aov::SecondMoment).map_err(|what| props.error(what))?;
             } else {
                 aov_layers(props, layers)?;
             }
@@ -182,10 +169,12 @@ fn aov_layers(props: &Props, layers: &mut Vec<AovLayer>) -> Result<(), SceneErro
             return Err(props.error_at("aovs", what));
         };
         let (name, kind) = (name.trim(), kind.trim());
-        check_name(name).map_err(|what| props.error_at("aovs", what))?;
         let Some((_, aov)) = TYPES.iter().find(|(n, _)| *n == kind) else {
             let error = match UNSUPPORTED.contains(&kind) {
-                true => props.error_at("aovs", format!("output variable \"{kind}\" is not supported")),
+                true => props.error_at(
+                    "aovs",
+                    format!("output variable \"{kind}\" is not supported"),
+                ),
                 false => {
                     let what = format!("unknown type \"{kind}\" of output variable \"{name}\"");
                     props.error_at("aovs", what)
@@ -193,25 +182,31 @@ fn aov_layers(props: &Props, layers: &mut Vec<AovLayer>) -> Result<(), SceneErro
             };
             return Err(error.with_help(suggest(kind, TYPES.map(|t| t.0))));
         };
-        layers.push(AovLayer {
-            name: name.to_string(),
-            aov: *aov,
-        });
+        add_layer(layers, name, *aov).map_err(|what| props.error_at("aovs", what))?;
     }
     Ok(())
 }
 
-/// Refuses what could not be written once the picture is rendered.
-fn check_name(name: &str) -> Result<(), String> {
+/// Adds a layer, or says why it could not be written once the picture is rendered.
+fn add_layer(layers: &mut Vec<AovLayer>, name: &str, aov: Aov) -> Result<(), String> {
     if name.is_empty() {
         return Err("an output variable has no name".to_string());
     }
     if OWN_LAYERS.contains(&name) {
-        return Err(format!("\"{name}\" is the name of a layer that every picture has"));
+        return Err(format!(
+            "\"{name}\" is the name of a layer that every picture has"
+        ));
     }
     if name.len() > LAYER_NAME_BYTES || name.chars().any(char::is_control) {
         return Err("the name of an output variable is too long, or not printable".to_string());
     }
+    if layers.iter().any(|l| l.name == name) {
+        return Err(format!("two layers would have the name \"{name}\""));
+    }
+    layers.push(AovLayer {
+        name: name.to_string(),
+        aov,
+    });
     Ok(())
 }
 

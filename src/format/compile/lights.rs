@@ -1,6 +1,7 @@
 //! Emitters of shapes and of the scene.
 
 use super::materials::Materials;
+use super::{out_of_reach, within_reach};
 use crate::format::plugins::Category;
 use crate::format::{Props, RgbOrTexture, SceneError};
 use crate::geom::ShapeId;
@@ -92,6 +93,14 @@ fn point(p: &Props, center: DVec3) -> Result<Emitter, SceneError> {
         true => p.transform("to_world")?.point(DVec3::ZERO),
         false => p.vec3("position")?,
     };
+    if !within_reach(position) {
+        let name = if p.is_given("to_world") {
+            "to_world"
+        } else {
+            "position"
+        };
+        return Err(p.error_at(name, out_of_reach("the emitter")));
+    }
     Ok(Emitter::Point {
         p: (position - center).as_vec3(),
         intensity: p.rgb("intensity")?,

@@ -8,14 +8,14 @@ use glam::Affine2;
 
 use crate::bsdf::{Bsdf, Diffuse, Shape, metals};
 use crate::format::plugins::Category;
-use crate::format::{
-    FloatOrTexture, ObjectId, Props, RgbOrTexture, SceneDesc, SceneError, did_you_mean,
-};
+use crate::format::{FloatOrTexture, ObjectId, Props, RgbOrTexture, SceneDesc, SceneError};
 use crate::image_io::{self, Encoding, Pixels};
 use crate::material::{Material, Metal, Roughness};
 use crate::math::{DVec3, Rgb, Transform, Vec2};
 use crate::scene::{MaterialId, Plan};
 use crate::texture::{Bitmap, Checkerboard, Interpolation, Picture, Texels, Texture, Wrap};
+
+use super::suggest;
 
 pub struct Materials<'a> {
     desc: &'a SceneDesc,
@@ -25,6 +25,8 @@ pub struct Materials<'a> {
     default: Option<MaterialId>,
     textures: HashMap<ObjectId, Texture>,
     pictures: HashMap<(PathBuf, bool), Arc<Picture>>,
+    /// What was mended, for the user to know.
+    warnings: Vec<String>,
 }
 
 impl<'a> Materials<'a> {
@@ -36,11 +38,13 @@ impl<'a> Materials<'a> {
             default: None,
             textures: HashMap::new(),
             pictures: HashMap::new(),
+            warnings: Vec::new(),
         }
     }
 
     /// The materials by id; the plan says how many need a look-up.
-    pub fn finish(self, plan: &mut Plan) -> Vec<Material> {
+    pub fn finish(self, plan: &mut Plan, warnings: &mut Vec<String>) -> Vec<Material> {
+        warnings.extend(self.warnings);
         let varying = self
             .materials
             .iter()
@@ -143,12 +147,12 @@ impl<'a> Materials<'a> {
                 let (inside, outside) = (p.ior("int_ior")?, p.ior("ext_ior")?);
                 Material::Dielectric {
                     eta: (inside / outside) as f32,
-                    reflectance: self.color(p, "specular_reflectance")?,
-                    transmittance: self.color(p, "specular_transmittance")?,
+                    reflectance: self.reflectance(p, "specular_reflectance")?,
+                    transmittance: self.reflectance(p, "specular_transmittance")?,
                 }
             }
             _ => Material::Diffuse {
-                reflectance: self.color(p, "reflectance")?,
+                reflectance: self.reflectance(p, "reflectance")?,
             },
         })
     }
@@ -156,9 +160,8 @@ impl<'a> Materials<'a> {
     fn metal(&mut self, p: &Props<'a>) -> Result<Metal, SceneError> {
         let name = p.string("material")?;
         let known = metals::lookup(name).ok_or_else(|| {
-            let help = did_you_mean(name, metals::names());
             p.error_at("material", format!("no metal \"{name}\" is known"))
-                .with_help_opt(help)
+                .with_help(suggest(name, metals::names().collect::<Vec<_>>()))
         });
         let mut given = |name: &str, known: Rgb| -> Result<Texture, SceneError> {
             match p.opt_rgb_or_texture(name)? {
@@ -170,13 +173,37 @@ impl<'a> Materials<'a> {
         Ok(Metal {
             eta: given("eta", eta)?,
             k: given("k", k)?,
-            reflectance: self.color(p, "specular_reflectance")?,
+            reflectance: self.reflectance(p, "specular_reflectance")?,
         })
     }
 
-    fn color(&mut self, p: &Props<'a>, name: &str) -> Result<Texture, SceneError> {
+    /// A reflectance or transmittance: what a picture has above 1 would make light out of nothing, on and
+    /// on where it is enclosed.
+    fn reflectance(&mut self, p: &Props<'a>, name: &str) -> Result<Texture, SceneError> {
         let value = p.rgb_or_texture(name)?;
-        self.resolve(value)
+        Ok(match self.resolve(value)? {
+            Texture::Constant(c) => Texture::Constant(c.map(|v| v.min(1.0))),
+            Texture::Bitmap(mut bitmap) => {
+                if let Texels::Floats(data) = &bitmap.texels.texels
+                    && data.iter().flatten().any(|v| *v > 1.0)
+                {
+                    let at = p.error_at(name, "values above 1 are cut to 1").at;
+                    self.warnings.push(format!(
+                        "{}:{}:{}: the picture has values above 1, which as \"{name}\" are cut to 1",
+                        at.file.display(),
+                        at.line,
+                        at.column
+                    ));
+                    let cut = data.iter().map(|t| t.map(|v| v.min(1.0))).collect();
+                    bitmap.texels = Arc::new(Picture {
+                        texels: Texels::Floats(cut),
+                        ..*bitmap.texels
+                    });
+                }
+                Texture::Bitmap(bitmap)
+            }
+            other => other,
+        })
     }
 
     fn scalar(&mut self, p: &Props<'a>, name: &str) -> Result<Texture, SceneError> {
@@ -201,8 +228,8 @@ impl<'a> Materials<'a> {
         let to_uv = affine2(&p.transform("to_uv")?);
         let texture = match p.plugin() {
             "checkerboard" => Texture::Checkerboard(Box::new(Checkerboard {
-                color0: self.color(&p, "color0")?,
-                color1: self.color(&p, "color1")?,
+                color0: self.reflectance(&p, "color0")?,
+                color1: self.reflectance(&p, "color1")?,
                 to_uv,
             })),
             _ => self.bitmap(&p, to_uv)?,
@@ -220,20 +247,18 @@ impl<'a> Materials<'a> {
             Some(picture) => Arc::clone(picture),
             None => {
                 let read = image_io::Bitmap::read(&key.0);
-                let picture = read.map(|b| Arc::new(picture(b, key.1)));
-                let picture = picture.map_err(|e| p.error_at("filename", e.to_string()))?;
+                let mut picture = read
+                    .map(|b| picture(b, key.1))
+                    .map_err(|e| p.error_at("filename", e.to_string()))?;
+                if let Texels::Floats(data) = &mut picture.texels {
+                    check_values(data, picture.width as usize)
+                        .map_err(|what| p.error_at("filename", what))?;
+                }
+                let picture = Arc::new(picture);
                 self.pictures.insert(key, Arc::clone(&picture));
                 picture
             }
         };
-        if let Texels::Floats(data) = &texels.texels
-            && data.iter().flatten().any(|v| !v.is_finite())
-        {
-            return Err(p.error_at(
-                "filename",
-                "the image has values that are not finite numbers",
-            ));
-        }
         let interpolation = match p.choice("filter_type")? {
             "nearest" => Interpolation::Nearest,
             _ => Interpolation::Bilinear,
@@ -292,6 +317,22 @@ fn picture(bitmap: image_io::Bitmap, raw: bool) -> Picture {
         height: bitmap.height as u32,
         texels,
     }
+}
+
+/// Refuses what is no number, and makes zero of what lies below: pictures that were filtered with negative
+/// lobes have a little of it, and no texture means it.
+fn check_values(data: &mut [[f32; 3]], width: usize) -> Result<(), String> {
+    for (i, value) in data.iter_mut().enumerate() {
+        if !value.iter().all(|v| v.is_finite()) {
+            return Err(format!(
+                "pixel ({}, {}) is not a finite number",
+                i % width,
+                i / width
+            ));
+        }
+        *value = value.map(|v| v.max(0.0));
+    }
+    Ok(())
 }
 
 /// The part of a transform that acts on the first two coordinates.

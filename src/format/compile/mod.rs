@@ -9,10 +9,11 @@ mod shapes;
 
 use rayon::prelude::*;
 
-use super::plugins::Category;
 use super::error::command_line;
+use super::plugins::Category;
 use super::{Props, SceneDesc, SceneError, did_you_mean, list};
 use crate::film::Window;
+use crate::math::DVec3;
 use crate::render::{AovLayer, Job};
 use crate::scene::{Plan, Scene};
 use crate::transport::aov::Aov;
@@ -80,7 +81,7 @@ pub fn compile(desc: &SceneDesc, overrides: &Overrides) -> Result<Compiled, Scen
         warnings.push("the scene has no emitter, so the picture is black".to_string());
     }
     let camera = film::camera(&sensor, &film.spec, center)?;
-    let materials = materials.finish(&mut plan);
+    let materials = materials.finish(&mut plan, &mut warnings);
     desc.check_all_read()?;
     Ok(Compiled {
         job: Job {
@@ -98,6 +99,20 @@ pub fn compile(desc: &SceneDesc, overrides: &Overrides) -> Result<Compiled, Scen
         warnings,
         hash: desc.hash(),
     })
+}
+
+/// Largest coordinate of what a scene is made of, in scene units: squares of distances stay far within f32,
+/// in which rays are traced.
+const MAX_COORDINATE: f64 = 1e15;
+
+/// Whether `p`, world space, is near enough to the origin to be rendered.
+fn within_reach(p: DVec3) -> bool {
+    p.abs().max_element() <= MAX_COORDINATE
+}
+
+/// What is wrong where [`within_reach`] says no.
+fn out_of_reach(what: &str) -> String {
+    format!("{what} lies more than {MAX_COORDINATE:e} from the origin, too far to be rendered")
 }
 
 /// An error in what the command line asks for.

@@ -9,6 +9,8 @@ use crate::geom::{Cylinder, Disk, Geometry, Mesh, Sphere};
 use crate::math::{DVec3, Transform, Vec3};
 use crate::scene::Plan;
 
+use super::{out_of_reach, within_reach};
+
 /// A shape whose place in the world is known but not yet rounded.
 pub struct Source<'a> {
     props: Props<'a>,
@@ -159,11 +161,16 @@ const NEAR_ORIGIN: f64 = 4.0;
 
 /// Chooses the centre and makes the shapes relative to it.
 pub fn place(sources: Vec<Source>, plan: &mut Plan) -> Result<(Vec<Geometry>, DVec3), SceneError> {
-    let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    let (lo, hi) = sources
-        .iter()
-        .map(bounds)
-        .fold(start, |(lo, hi), (l, h)| (lo.min(l), hi.max(h)));
+    let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for source in &sources {
+        let (l, h) = bounds(source);
+        // NaN is out of reach too.
+        if !(within_reach(l) && within_reach(h)) {
+            let what = out_of_reach("a part of the shape");
+            return Err(source.props.error_at("to_world", what));
+        }
+        (lo, hi) = (lo.min(l), hi.max(h));
+    }
     let middle = 0.5 * (lo + hi);
     let radius = 0.5 * (hi - lo).length();
     let center = if sources.is_empty() || middle.length() <= NEAR_ORIGIN * radius {

@@ -11,16 +11,21 @@ fn wrong(what: impl Into<String>) -> Wrong {
     (what.into(), None)
 }
 
-/// A finite number with nothing after it.
+/// A finite number, also as f32, with nothing after it.
 pub fn float(text: &str) -> Result<f64, Wrong> {
     let number: f64 = text
         .trim()
         .parse()
         .map_err(|_| wrong(format!("{} is not a number", quoted(text))))?;
-    match number.is_finite() {
-        true => Ok(number),
-        false => Err(wrong(format!("{} is not a finite number", quoted(text)))),
+    if !number.is_finite() {
+        return Err(wrong(format!("{} is not a finite number", quoted(text))));
     }
+    // Most of them become f32.
+    if number.abs() > f32::MAX.into() {
+        let what = format!("{} is too large: numbers reach to 3.4e38", quoted(text));
+        return Err(wrong(what));
+    }
+    Ok(number)
 }
 
 pub fn int(text: &str) -> Result<i64, Wrong> {
@@ -207,7 +212,9 @@ mod tests {
     fn numbers_are_complete_and_finite() {
         assert_eq!(float(" .5 "), Ok(0.5));
         assert_eq!(float("+1e-3"), Ok(1e-3));
-        for bad in ["", "1a", "1,5", "nan", "inf", "1e999", "0x10", "1 2"] {
+        for bad in [
+            "", "1a", "1,5", "nan", "inf", "1e999", "-1e39", "0x10", "1 2",
+        ] {
             assert!(float(bad).is_err(), "{bad}");
         }
         assert_eq!(int(" -12 "), Ok(-12));
