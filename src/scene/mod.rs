@@ -81,7 +81,7 @@ impl Scene {
                 .map(|(i, g)| (ShapeId(i as u32), g))
         };
         let mesh = |(shape, g)| match g {
-            &Geometry::Mesh(ref m) => Some(MeshRef {
+            Geometry::Mesh(m) => Some(MeshRef {
                 shape,
                 positions: m.positions(),
                 indices: m.indices(),
