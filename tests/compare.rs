@@ -7,7 +7,8 @@ use std::fs;
 use std::path::PathBuf;
 
 use clap::Parser;
-use luxel::cli::compare::{self, CompareArgs, Failure, Outcome};
+use luxel::cli::compare::{self, CompareArgs};
+use luxel::cli::{Failure, Outcome};
 use luxel::image_io::color::{RGB_TO_XYZ, XYZ_TO_RGB, apply};
 use luxel::image_io::{Image, Layer, Samples};
 use luxel::math::Rgb;
@@ -290,7 +291,7 @@ fn the_command_prints_a_table_or_json_and_judges() {
     let right = folder
         .run(&format!("right.exr reference.exr {test}"))
         .unwrap();
-    assert_eq!(right.outcome(), Outcome::Passed);
+    assert_eq!(right.outcome(), Outcome::Done);
     let json = right.to_json();
     assert_eq!(json["z_test"]["pass"], true);
     assert_eq!(json["width"], WIDTH);
@@ -330,8 +331,8 @@ fn the_command_reads_the_standard_errors_of_our_files() {
     save("dark.exr", &rendered(10, SPP, 0.99, false), &image);
     folder.save("plain.exr", &rendered(10, SPP, 1.0, false));
     let outcome = |line: &str| folder.run(line).unwrap().outcome();
-    assert_eq!(outcome("right.exr reference.exr --stderr"), Outcome::Passed);
-    assert_eq!(outcome("dark.exr reference.exr --stderr"), Outcome::Failed);
+    assert_eq!(outcome("right.exr reference.exr --stderr"), Outcome::Done);
+    assert_eq!(outcome("dark.exr reference.exr --stderr"), Outcome::TestFailed);
     assert_eq!(
         folder.failure("plain.exr reference.exr --stderr"),
         ("--stderr: plain.exr has no layer \"stderr\"".to_string(), 2)

@@ -2,10 +2,10 @@
 //!
 //! Source: common handbook values under the names that Mitsuba's scene files use.
 
-/// Index of refraction of the matter of that name (lower case, as listed by [`names`]).
-pub fn lookup(name: &str) -> Option<f32> {
-    let found = IORS.binary_search_by(|(n, _)| (*n).cmp(name)).ok()?;
-    Some(IORS[found].1)
+/// Index of refraction of the matter of that name (one of [`names`], in any case).
+pub fn lookup(name: &str) -> Option<f64> {
+    let found = IORS.iter().find(|(n, _)| n.eq_ignore_ascii_case(name));
+    found.map(|&(_, index)| index)
 }
 
 /// All names, in alphabetical order.
@@ -14,7 +14,7 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 }
 
 /// Sorted by name.
-static IORS: &[(&str, f32)] = &[
+static IORS: &[(&str, f64)] = &[
     ("acetone", 1.36),
     ("acrylic glass", 1.49),
     ("air", 1.000277),
@@ -54,6 +54,7 @@ mod tests {
             );
         }
         assert_eq!(lookup("bk7"), Some(1.5046));
+        assert_eq!(lookup("Water Ice"), Some(1.31));
         assert_eq!(lookup("glass"), None);
     }
 }

@@ -7,12 +7,13 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
-use crate::image_io::{Image, ImageError};
+use super::{Failure, Outcome};
+use crate::image_io::Image;
 use crate::study::error_map::{error_map, signed_difference};
 use crate::study::flip;
 use crate::study::metrics::Metrics;
 use crate::study::z_test::{BiasTest, Noise, Rule, Verdict, z_test};
-use crate::study::{CompareError, Picture};
+use crate::study::Picture;
 
 /// Samples per pixel of the references that come with a variance per sample, unless told otherwise.
 const USUAL_REFERENCE_SPP: f64 = 32_000.0;
@@ -83,60 +84,6 @@ fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
-/// How a comparison ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
-    /// Every test that was asked for passed, or none was.
-    Passed,
-    Failed,
-}
-
-impl Outcome {
-    pub fn exit_code(self) -> u8 {
-        match self {
-            Outcome::Passed => 0,
-            Outcome::Failed => 1,
-        }
-    }
-}
-
-/// Why a comparison could not be made.
-#[derive(Debug)]
-pub enum Failure {
-    Input(CompareError),
-    /// Options that do not go together.
-    Usage(String),
-    Output(ImageError),
-}
-
-impl Failure {
-    pub fn exit_code(&self) -> u8 {
-        match self {
-            Failure::Input(_) => 1,
-            Failure::Usage(_) => 2,
-            Failure::Output(_) => 3,
-        }
-    }
-}
-
-impl fmt::Display for Failure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Failure::Input(e) => e.fmt(f),
-            Failure::Usage(e) => e.fmt(f),
-            Failure::Output(e) => e.fmt(f),
-        }
-    }
-}
-
-impl std::error::Error for Failure {}
-
-impl From<CompareError> for Failure {
-    fn from(e: CompareError) -> Failure {
-        Failure::Input(e)
-    }
-}
-
 /// Runs the command and prints its findings.
 pub fn run(args: &CompareArgs) -> Result<Outcome, Failure> {
     let report = compare(args)?;
@@ -185,8 +132,7 @@ pub fn compare(args: &CompareArgs) -> Result<Report, Failure> {
                 (signed_difference(&image, &reference), None)
             };
             Image::from_rgb(picture.width, picture.height, &picture.pixels)
-                .write(path)
-                .map_err(Failure::Output)?;
+                .write(path)?;
             Some((path.clone(), scale))
         }
         _ => None,
@@ -269,10 +215,11 @@ fn stderr_squared(path: &Path) -> Result<Picture, Failure> {
 }
 
 impl Report {
+    /// `TestFailed` when a test was asked for and failed.
     pub fn outcome(&self) -> Outcome {
         match &self.verdict {
-            Some(verdict) if !verdict.pass() => Outcome::Failed,
-            _ => Outcome::Passed,
+            Some(verdict) if !verdict.pass() => Outcome::TestFailed,
+            _ => Outcome::Done,
         }
     }
 

@@ -14,6 +14,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::format::SceneError;
 use crate::image_io::ImageError;
+use crate::study::CompareError;
 
 #[derive(Parser, Debug)]
 #[command(
@@ -63,6 +64,19 @@ impl fmt::Display for Failure {
     }
 }
 
+impl std::error::Error for Failure {}
+
+impl Failure {
+    /// What the program answers to its caller.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Failure::Input(_) => 1,
+            Failure::Usage(_) => 2,
+            Failure::Output(_) => 3,
+        }
+    }
+}
+
 impl From<SceneError> for Failure {
     fn from(e: SceneError) -> Failure {
         Failure::Input(e.to_string())
@@ -78,6 +92,12 @@ impl From<ImageError> for Failure {
     }
 }
 
+impl From<CompareError> for Failure {
+    fn from(e: CompareError) -> Failure {
+        Failure::Input(e.to_string())
+    }
+}
+
 /// How a command ended that ran to its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
@@ -86,6 +106,18 @@ pub enum Outcome {
     TestFailed,
     /// Stopped by Ctrl-C; what was done is written.
     Interrupted,
+}
+
+impl Outcome {
+    /// What the program answers to its caller.
+    pub fn exit_code(self) -> u8 {
+        match self {
+            Outcome::Done => 0,
+            Outcome::TestFailed => 1,
+            // As a shell reports the end by this signal: 128 + SIGINT.
+            Outcome::Interrupted => 130,
+        }
+    }
 }
 
 /// Runs the program with these arguments (the program's name first) and gives its exit code.
@@ -106,13 +138,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         .join(" ");
     let result = match &cli.command {
         Command::Render(args) => render::run(args, &line),
-        Command::Compare(args) => match compare::run(args) {
-            Ok(compare::Outcome::Passed) => Ok(Outcome::Done),
-            Ok(compare::Outcome::Failed) => Ok(Outcome::TestFailed),
-            Err(compare::Failure::Input(e)) => Err(Failure::Input(e.to_string())),
-            Err(compare::Failure::Usage(e)) => Err(Failure::Usage(e)),
-            Err(compare::Failure::Output(e)) => Err(e.into()),
-        },
+        Command::Compare(args) => compare::run(args),
         Command::Info(args) => info::run(args),
         Command::Completions { shell } => {
             clap_complete::generate(*shell, &mut Cli::command(), "luxel", &mut std::io::stdout());
@@ -120,16 +146,10 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
     };
     match result {
-        Ok(Outcome::Done) => ExitCode::SUCCESS,
-        Ok(Outcome::TestFailed) => ExitCode::from(1),
-        Ok(Outcome::Interrupted) => ExitCode::from(130),
+        Ok(outcome) => ExitCode::from(outcome.exit_code()),
         Err(failure) => {
             eprintln!("error: {failure}");
-            ExitCode::from(match failure {
-                Failure::Input(_) => 1,
-                Failure::Usage(_) => 2,
-                Failure::Output(_) => 3,
-            })
+            ExitCode::from(failure.exit_code())
         }
     }
 }

@@ -2,9 +2,10 @@
 
 use super::desc::{Child, Given, Object, Value};
 use super::error::{Place, SceneError, Span, did_you_mean, list, shown_number};
-use super::plugins::{self, Category, Default, Kind, MEDIA, Param, Plugin, Role, named_ior};
+use super::plugins::{self, Category, Default, Kind, Param, Plugin, Role};
 use super::props::{float_of, is_parameter, missing_parameter};
 use super::spectrum::Spectrum;
+use crate::bsdf::iors;
 use std::path::PathBuf;
 
 /// The row of a plugin, or what is wrong with its name.
@@ -198,10 +199,9 @@ fn value(plugin: &Plugin, param: &Param, value: &Value) -> Result<(), Wrong> {
             ),
             None,
         )),
-        (Kind::Ior, Value::Text(medium)) => named_ior(medium).map(|_| ()).ok_or_else(|| {
-            let names = || MEDIA.iter().map(|&(name, _)| name);
-            let help = did_you_mean(medium, names())
-                .unwrap_or_else(|| format!("known are {}", list(names())));
+        (Kind::Ior, Value::Text(medium)) => iors::lookup(medium).map(|_| ()).ok_or_else(|| {
+            let help = did_you_mean(medium, iors::names())
+                .unwrap_or_else(|| format!("known are {}", list(iors::names())));
             (format!("unknown medium \"{medium}\""), Some(help))
         }),
         (Kind::Color(role), _) => color(role, value).ok_or_else(mistyped)?.map_err(|found| {

@@ -144,6 +144,17 @@ pub fn whole_file(file: &Path) -> Place {
     }
 }
 
+/// The place of the value of an option of the command line, such as `-D` or `--aov`.
+pub fn command_line(option: &str, value: &str) -> Place {
+    let column = option.chars().count() + 2;
+    Place {
+        file: "command line".into(),
+        line: 1,
+        column: column as u32,
+        text: shown_line(&format!("{option} {value}"), column),
+    }
+}
+
 /// A help line with the candidate most like `found`, if one is close enough to be a slip.
 pub fn did_you_mean<'a>(
     found: &str,

@@ -3,7 +3,8 @@
 
 use super::desc::{Child, Given, Object, ObjectId, SceneDesc, Value};
 use super::error::{Place, SceneError};
-use super::plugins::{Category, Default, Kind, Param, Plugin, Role, named_ior};
+use super::plugins::{Category, Default, Kind, Param, Plugin, Role};
+use crate::bsdf::iors;
 use crate::math::{DVec3, Rgb, Transform};
 use std::path::Path;
 
@@ -217,7 +218,7 @@ impl<'a> Props<'a> {
             (None, Default::Text(medium)) => medium,
             _ => return Err(self.mistyped(name, "an index of refraction")),
         };
-        named_ior(medium).ok_or_else(|| self.mistyped(name, "an index of refraction"))
+        iors::lookup(medium).ok_or_else(|| self.mistyped(name, "an index of refraction"))
     }
 
     pub fn rgb_or_texture(&self, name: &str) -> Result<RgbOrTexture, SceneError> {

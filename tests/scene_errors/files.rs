@@ -87,11 +87,12 @@ fn mesh_files() {
     let error = |kind: &str, name: &str, content: &[u8]| {
         fs::write(dir.join(name), content).unwrap();
         let xml = format!(
-            "<scene version='3.0.0'>\n<shape type='{kind}'><string name='filename' value='{name}'/></shape></scene>"
+            "<scene version='3.0.0'>\n<shape type='{kind}'><string name='filename' value='{name}'/></shape>\n\
+             <sensor type='perspective'/></scene>"
         );
         let desc = format::load_str("a.xml", &xml, &dir, &[]).unwrap();
-        let shape = desc.scene().child(Category::Shape).unwrap();
-        let text = format::mesh_io::read(&shape).unwrap_err().to_string();
+        let compiled = format::compile(&desc, &format::Overrides::default());
+        let text = compiled.unwrap_err().to_string();
         text.replace(dir.to_str().unwrap(), "DIR")
     };
     says(
@@ -121,21 +122,21 @@ a.xml:2:43: the name of the file is empty
         error("obj", "a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n"),
         r#"
 a.xml:2:43: DIR/a.obj:4: index 4 is out of range: there are 3 vertices so far
-  <shape type='obj'><string name='filename' value='a.obj'/></shape></scene>
+  <shape type='obj'><string name='filename' value='a.obj'/></shape>
                                             ^"#,
     );
     says(
         error("obj", "empty.obj", b""),
         r#"
 a.xml:2:43: DIR/empty.obj: the mesh has no triangles
-  <shape type='obj'><string name='filename' value='empty.obj'/></shape></scene>
+  <shape type='obj'><string name='filename' value='empty.obj'/></shape>
                                             ^"#,
     );
     says(
         error("obj", "nan.obj", b"v 0 0 nan\n"),
         r#"
 a.xml:2:43: DIR/nan.obj:1: "nan" is not a finite number
-  <shape type='obj'><string name='filename' value='nan.obj'/></shape></scene>
+  <shape type='obj'><string name='filename' value='nan.obj'/></shape>
                                             ^"#,
     );
     let header = b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\n\
@@ -145,7 +146,7 @@ a.xml:2:43: DIR/nan.obj:1: "nan" is not a finite number
         error("ply", "cut.ply", &cut),
         r#"
 a.xml:2:43: DIR/cut.ply: the file is truncated: 3 elements "vertex" do not fit into the 30 bytes that are left
-  <shape type='ply'><string name='filename' value='cut.ply'/></shape></scene>
+  <shape type='ply'><string name='filename' value='cut.ply'/></shape>
                                             ^"#,
     );
     let nan = [&header[..], &f32::NAN.to_le_bytes(), &[0; 40]].concat();
@@ -153,14 +154,14 @@ a.xml:2:43: DIR/cut.ply: the file is truncated: 3 elements "vertex" do not fit i
         error("ply", "nan.ply", &nan),
         r#"
 a.xml:2:43: DIR/nan.ply: vertex 0 is not finite
-  <shape type='ply'><string name='filename' value='nan.ply'/></shape></scene>
+  <shape type='ply'><string name='filename' value='nan.ply'/></shape>
                                             ^"#,
     );
     says(
         error("ply", "not.ply", b"solid\n"),
         r#"
 a.xml:2:43: DIR/not.ply:1: not a PLY file: the first line is not "ply"
-  <shape type='ply'><string name='filename' value='not.ply'/></shape></scene>
+  <shape type='ply'><string name='filename' value='not.ply'/></shape>
                                             ^"#,
     );
 }

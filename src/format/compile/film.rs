@@ -8,7 +8,7 @@ use crate::render::{ComponentFormat, PixelFormat};
 use crate::sampler::SamplerKind;
 use crate::scene::{Camera, FovAxis, PerspectiveSpec, Plan};
 
-use super::suggest;
+use super::{on_command_line, suggest};
 
 /// Most pixels of a picture: beyond, film and files would not fit into memory.
 const MAX_PIXELS: u64 = 1 << 28;
@@ -67,16 +67,17 @@ pub fn film(sensor: &Props, overrides: &Overrides) -> Result<Film, SceneError> {
     if let Some(resolution) = overrides.resolution {
         if crop.is_some() && overrides.crop.is_none() {
             let what = "the film has a crop window, which a new resolution makes meaningless";
-            return Err(sensor.error(what).with_help("give --crop too"));
+            return Err(film_error(props.as_ref().unwrap_or(sensor), overrides, what)
+                .with_help("give --crop too"));
         }
         size = resolution;
     }
     let [width, height] = size;
+    let at = props.as_ref().unwrap_or(sensor);
     let pixels = u64::from(width) * u64::from(height);
     if pixels == 0 {
-        return Err(sensor.error(format!(
-            "a picture of {width} x {height} pixels has no pixel"
-        )));
+        let what = format!("a picture of {width} x {height} pixels has no pixel");
+        return Err(film_error(at, overrides, what));
     }
     let crop = overrides.crop.or(crop).unwrap_or(Window {
         x: 0,
@@ -92,12 +93,12 @@ pub fn film(sensor: &Props, overrides: &Overrides) -> Result<Film, SceneError> {
             "the crop window of {} x {} pixels at ({}, {}) does not lie within the picture of {width} x {height}",
             crop.width, crop.height, crop.x, crop.y
         );
-        return Err(props.as_ref().unwrap_or(sensor).error(what));
+        return Err(film_error(at, overrides, what));
     }
     let rendered = u64::from(crop.width) * u64::from(crop.height);
     if rendered > MAX_PIXELS {
         let what = format!("{rendered} pixels are more than a picture can have ({MAX_PIXELS})");
-        return Err(props.as_ref().unwrap_or(sensor).error(what));
+        return Err(film_error(at, overrides, what));
     }
     Ok(Film {
         spec: FilmSpec {
@@ -109,6 +110,20 @@ pub fn film(sensor: &Props, overrides: &Overrides) -> Result<Film, SceneError> {
         pixel_format,
         component_format,
     })
+}
+
+/// An error about the size of the film, at what set it: the command line before the scene.
+fn film_error(film: &Props, overrides: &Overrides, what: impl Into<String>) -> SceneError {
+    match (overrides.crop, overrides.resolution) {
+        (Some(c), _) => {
+            let value = format!("{},{},{},{}", c.x, c.y, c.width, c.height);
+            on_command_line("--crop", &value, what)
+        }
+        (None, Some([width, height])) => {
+            on_command_line("--resolution", &format!("{width}x{height}"), what)
+        }
+        (None, None) => film.error(what),
+    }
 }
 
 fn crop_of(film: &Props, size: [u32; 2]) -> Result<Option<Window>, SceneError> {
@@ -192,10 +207,9 @@ pub fn sampler(
             "independent" => SamplerKind::Independent,
             "sobol" => SamplerKind::Sobol,
             _ => {
-                let error = sensor.error(format!(
-                    "unknown sampler \"{name}\" asked for on the command line"
-                ));
-                return Err(error.with_help(suggest(name, ["independent", "sobol"])));
+                let what = format!("unknown sampler \"{name}\"");
+                return Err(on_command_line("--sampler", name, what)
+                    .with_help(suggest(name, ["independent", "sobol"])));
             }
         };
         reason = "the command line asks for it".to_string();

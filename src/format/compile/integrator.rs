@@ -1,6 +1,6 @@
 //! The integrator, and the layers that its wrappers ask for.
 
-use super::suggest;
+use super::{on_command_line, suggest};
 use crate::format::plugins::Category;
 use crate::format::{Overrides, Props, SceneError};
 use crate::render::AovLayer;
@@ -28,6 +28,12 @@ const TYPES: [(&str, Aov); 8] = [
     ("shape_index", Aov::ShapeIndex),
     ("prim_index", Aov::PrimIndex),
 ];
+/// Further types of Mitsuba's.
+const UNSUPPORTED: [&str; 5] = ["boundary_test", "dp_du", "dp_dv", "duv_dx", "duv_dy"];
+/// Layers that every picture has.
+const OWN_LAYERS: [&str; 2] = ["stderr", "spp"];
+/// Bytes of a layer's name: with the channel's they must stay below the 255 of an EXR file.
+const LAYER_NAME_BYTES: usize = 200;
 const DEFAULT_RR_DEPTH: u32 = 5;
 
 pub fn integrator(
@@ -41,25 +47,24 @@ pub fn integrator(
     };
     let spec = spec.unwrap_or(default_path());
     let mut spec = match &overrides.integrator {
-        Some(name) => replaced(spec, name, root)?,
+        Some(name) => replaced(spec, name)?,
         None => spec,
     };
     if let Some(depth) = overrides.max_depth {
         match &mut spec {
             IntegratorSpec::Path(path) => path.max_depth = depth_limit(depth),
             IntegratorSpec::Direct(_) => {
-                let error = root
-                    .error("the integrator \"direct\" has no depth for the command line to set");
-                return Err(error.with_help("leave --max-depth out, or give --integrator path"));
+                let what = "the integrator \"direct\" has no depth to set";
+                return Err(on_command_line("--max-depth", &depth.to_string(), what)
+                    .with_help("leave --max-depth out, or give --integrator path"));
             }
         }
     }
     for name in &overrides.aovs {
         let Some((_, aov)) = LAYERS.iter().find(|(n, _)| n == name) else {
-            let error = root.error(format!(
-                "unknown layer \"{name}\" asked for on the command line"
-            ));
-            return Err(error.with_help(suggest(name, LAYERS.map(|l| l.0))));
+            let what = format!("unknown layer \"{name}\"");
+            return Err(on_command_line("--aov", name, what)
+                .with_help(suggest(name, LAYERS.map(|l| l.0))));
         };
         layers.push(AovLayer {
             name: name.clone(),
@@ -176,22 +181,42 @@ fn aov_layers(props: &Props, layers: &mut Vec<AovLayer>) -> Result<(), SceneErro
             let what = format!("expected name:type, found \"{part}\"");
             return Err(props.error_at("aovs", what));
         };
-        let Some((_, aov)) = TYPES.iter().find(|(n, _)| *n == kind.trim()) else {
-            let what = format!("unknown type \"{kind}\" of output variable \"{name}\"");
-            return Err(props
-                .error_at("aovs", what)
-                .with_help(suggest(kind, TYPES.map(|t| t.0))));
+        let (name, kind) = (name.trim(), kind.trim());
+        check_name(name).map_err(|what| props.error_at("aovs", what))?;
+        let Some((_, aov)) = TYPES.iter().find(|(n, _)| *n == kind) else {
+            let error = match UNSUPPORTED.contains(&kind) {
+                true => props.error_at("aovs", format!("output variable \"{kind}\" is not supported")),
+                false => {
+                    let what = format!("unknown type \"{kind}\" of output variable \"{name}\"");
+                    props.error_at("aovs", what)
+                }
+            };
+            return Err(error.with_help(suggest(kind, TYPES.map(|t| t.0))));
         };
         layers.push(AovLayer {
-            name: name.trim().to_string(),
+            name: name.to_string(),
             aov: *aov,
         });
     }
     Ok(())
 }
 
+/// Refuses what could not be written once the picture is rendered.
+fn check_name(name: &str) -> Result<(), String> {
+    if name.is_empty() {
+        return Err("an output variable has no name".to_string());
+    }
+    if OWN_LAYERS.contains(&name) {
+        return Err(format!("\"{name}\" is the name of a layer that every picture has"));
+    }
+    if name.len() > LAYER_NAME_BYTES || name.chars().any(char::is_control) {
+        return Err("the name of an output variable is too long, or not printable".to_string());
+    }
+    Ok(())
+}
+
 /// The integrator `name` with the settings it shares with `spec`.
-fn replaced(spec: IntegratorSpec, name: &str, root: &Props) -> Result<IntegratorSpec, SceneError> {
+fn replaced(spec: IntegratorSpec, name: &str) -> Result<IntegratorSpec, SceneError> {
     let hide_emitters = match &spec {
         IntegratorSpec::Path(p) => p.hide_emitters,
         IntegratorSpec::Direct(d) => d.hide_emitters,
@@ -208,10 +233,8 @@ fn replaced(spec: IntegratorSpec, name: &str, root: &Props) -> Result<Integrator
             hide_emitters,
         })),
         _ => {
-            let error = root.error(format!(
-                "unknown integrator \"{name}\" asked for on the command line"
-            ));
-            Err(error.with_help(suggest(name, NAMES)))
+            let what = format!("unknown integrator \"{name}\"");
+            Err(on_command_line("--integrator", name, what).with_help(suggest(name, NAMES)))
         }
     }
 }

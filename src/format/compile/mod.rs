@@ -10,6 +10,7 @@ mod shapes;
 use rayon::prelude::*;
 
 use super::plugins::Category;
+use super::error::command_line;
 use super::{Props, SceneDesc, SceneError, did_you_mean, list};
 use crate::film::Window;
 use crate::render::{AovLayer, Job};
@@ -97,6 +98,11 @@ pub fn compile(desc: &SceneDesc, overrides: &Overrides) -> Result<Compiled, Scen
         warnings,
         hash: desc.hash(),
     })
+}
+
+/// An error in what the command line asks for.
+fn on_command_line(option: &str, value: &str, what: impl Into<String>) -> SceneError {
+    SceneError::new(command_line(option, value), what)
 }
 
 /// A help line for a name that is not among `names`: the nearest one, or all of them.

@@ -126,6 +126,8 @@ fn mesh(props: &Props, to_world: &Transform) -> Result<Kind, SceneError> {
     for n in data.normals.iter_mut().flatten() {
         *n = to_world.normal(n.as_dvec3()).normalize_or_zero().as_vec3();
     }
+    // As in Mitsuba, one normal in the file is enough to compute none: vertices without then count as
+    // flat, since a zero normal leaves the face its own.
     let smooth = !face_normals && data.normals.is_none();
     Ok(Kind::Mesh { data, smooth })
 }

@@ -4,14 +4,11 @@
 //! file is told with its name and, for text, its line. Nothing is allocated on the word of a header
 //! alone: declared counts are held against the bytes that are there.
 
-mod normals;
 mod obj;
 mod ply;
 mod ply_header;
 
-use super::error::SceneError;
 use super::limits;
-use super::props::Props;
 use crate::math::{DVec3, Vec2, Vec3};
 use std::fmt;
 use std::io::Read;
@@ -22,9 +19,10 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshData {
     pub positions: Vec<DVec3>,
-    /// Per vertex, of any length; a zero vector where the file has none.
+    /// Per vertex, of any length; a zero vector for a vertex without, when others have one. `None` asks
+    /// for computed normals (they are computed after `to_world`, by the caller).
     pub normals: Option<Vec<Vec3>>,
-    /// Per vertex.
+    /// Per vertex; (0, 0) for a vertex without, when others have one.
     pub uvs: Option<Vec<Vec2>>,
     pub indices: Vec<[u32; 3]>,
 }
@@ -52,31 +50,6 @@ impl std::error::Error for MeshError {}
 
 /// A message and the line it is about.
 type Wrong = (Option<usize>, String);
-
-/// The mesh of an `obj` or `ply` shape, with `face_normals` and `flip_tex_coords` applied: normals
-/// are `None` for face normals, else complete and of unit length (computed where the file has none).
-/// `flip_normals` and `to_world` are left to the caller.
-pub fn read(shape: &Props<'_>) -> Result<MeshData, SceneError> {
-    let path = shape.file("filename")?;
-    let face_normals = shape.bool("face_normals")?;
-    let flip = shape.bool("flip_tex_coords")?;
-    let mesh = match shape.plugin() {
-        "obj" => read_obj(path),
-        _ => read_ply(path),
-    };
-    let mut mesh = mesh.map_err(|error| shape.error_at("filename", error.to_string()))?;
-    if face_normals {
-        mesh.normals = None;
-    } else {
-        mesh.complete_normals();
-    }
-    if flip {
-        for uv in mesh.uvs.iter_mut().flatten() {
-            uv.y = 1.0 - uv.y;
-        }
-    }
-    Ok(mesh)
-}
 
 /// Reads a Wavefront OBJ file: `v`, `vt`, `vn`, `f`; other lines are skipped.
 pub fn read_obj(path: &Path) -> Result<MeshData, MeshError> {

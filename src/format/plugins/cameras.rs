@@ -137,7 +137,7 @@ pub const PLUGINS: &[Plugin] = &[
                     name: "aovs",
                     kind: Kind::Text,
                     default: Default::Required,
-                    doc: "Comma-separated name:type; types: depth position uv geo_normal sh_normal dp_du dp_dv duv_dx duv_dy prim_index shape_index albedo.",
+                    doc: "Comma-separated name:type; types: albedo depth position uv geo_normal sh_normal prim_index shape_index.",
                 },
                 HIDE,
                 PER_PASS,

@@ -7,13 +7,11 @@
 
 mod bsdfs;
 mod cameras;
-mod ior;
 mod lights;
 mod reference;
 mod shapes;
 mod unsupported;
 
-pub use ior::{MEDIA, named_ior};
 pub use reference::reference;
 pub use unsupported::why_unsupported;
 
@@ -422,6 +420,7 @@ pub fn scene() -> &'static Plugin {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bsdf::iors;
 
     #[test]
     fn defaults_are_values_of_their_type() {
@@ -437,7 +436,7 @@ mod tests {
                 (Kind::Bool, Default::Bool(_)) => true,
                 (Kind::Choice(words), Default::Text(word)) => words.contains(&word),
                 (Kind::Text, Default::Text(_)) => true,
-                (Kind::Ior, Default::Text(medium)) => named_ior(medium).is_some(),
+                (Kind::Ior, Default::Text(medium)) => iors::lookup(medium).is_some(),
                 (Kind::Point | Kind::Vector, Default::Point(_)) => true,
                 (Kind::Transform, Default::Identity) => true,
                 _ => false,

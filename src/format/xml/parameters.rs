@@ -1,6 +1,6 @@
 //! `<default>`, `-D` and `$name`.
 
-use super::super::error::{Place, SceneError, did_you_mean, list};
+use super::super::error::{Place, SceneError, command_line, did_you_mean, list};
 use super::super::limits;
 use std::collections::BTreeMap;
 use std::ops::Bound;
@@ -28,7 +28,7 @@ impl Parameters {
         for (i, (name, value)) in defines.iter().enumerate() {
             if name.is_empty() || name.contains('$') {
                 return Err(SceneError::new(
-                    command_line(defines, i),
+                    define(defines, i),
                     format!("\"{name}\" cannot be the name of a parameter"),
                 ));
             }
@@ -39,7 +39,7 @@ impl Parameters {
             };
             if values.insert(name.clone(), parameter).is_some() {
                 return Err(SceneError::new(
-                    command_line(defines, i),
+                    define(defines, i),
                     format!("parameter \"{name}\" is given twice"),
                 ));
             }
@@ -146,24 +146,15 @@ impl Parameters {
             Some(_) => format!("the parameters of the scene are {}", list(known())),
         });
         let what = format!("the scene does not use the parameter \"{name}\"");
-        Err(SceneError::new(command_line(defines, i), what).with_help(help))
+        Err(SceneError::new(define(defines, i), what).with_help(help))
     }
 }
 
 /// Shows a `-D` as if it stood in a file.
-fn command_line(defines: &[(String, String)], i: usize) -> Place {
+/// The place of the i-th of the `-D`.
+fn define(defines: &[(String, String)], i: usize) -> Place {
     let (name, value) = &defines[i];
-    let text: String = format!("-D {name}={value}")
-        .chars()
-        .map(|c| if c.is_control() { ' ' } else { c })
-        .take(200)
-        .collect();
-    Place {
-        file: "command line".into(),
-        line: 1,
-        column: 4,
-        text,
-    }
+    command_line("-D", &format!("{name}={value}"))
 }
 
 #[cfg(test)]
