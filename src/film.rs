@@ -42,18 +42,20 @@ const SAMPLES_PER_REPLICATE: u64 = 32;
 const MAX_SUMS: u64 = 64 << 20;
 
 /// How many replicates the samples of a pixel are dealt out to: 16 from 512 samples on. `spp` is `None`
-/// when it is not known yet.
+/// when it is not known yet. Always a power of two.
 pub fn replicates(spp: Option<u64>, pixels: u64) -> u32 {
-    let bounded = |n: u64| n.clamp(u64::from(MIN_REPLICATES), u64::from(MAX_REPLICATES)) as u32;
+    let bounded = |n: u64| {
+        let n = n.clamp(u64::from(MIN_REPLICATES), u64::from(MAX_REPLICATES));
+        1u32 << n.ilog2()
+    };
     let affordable = bounded(MAX_SUMS / pixels.max(1));
     let Some(spp) = spp else {
         return affordable;
     };
     // Powers of two keep the replicates' sizes powers of two, where Sobol points are at their best.
     let wanted = bounded((spp / SAMPLES_PER_REPLICATE).next_power_of_two());
-    wanted
-        .min(affordable)
-        .min(spp.clamp(1, u64::from(MAX_REPLICATES)) as u32)
+    let at_most = spp.clamp(1, u64::from(MAX_REPLICATES)).ilog2();
+    wanted.min(affordable).min(1 << at_most)
 }
 
 /// Sums over the samples of one pixel.
@@ -93,7 +95,7 @@ impl Tile {
     /// Adds sample number `sample` of the pixel at (`x`, `y`) within the tile. `value` must be finite.
     #[inline]
     pub fn add(&mut self, x: u32, y: u32, sample: u64, value: Rgb) {
-        let replicate = (sample % u64::from(self.replicates)) as usize;
+        let replicate = (sample & u64::from(self.replicates - 1)) as usize;
         let sum = &mut self.pixel(x, y).rgb[replicate];
         for (s, v) in sum.iter_mut().zip(value.to_array()) {
             *s += f64::from(v);

@@ -17,10 +17,11 @@ pub mod dim {
     /// First block of the path's vertices; each owns [`PER_VERTEX`] blocks.
     pub const VERTEX: u32 = 8;
     pub const PER_VERTEX: u32 = 8;
-    /// Offsets within a vertex. Direction (2), lobe (1), Russian roulette (1).
-    pub const BSDF: u32 = 0;
-    /// Point on the light (2), choice of the light (1).
-    pub const LIGHT: u32 = 1;
+    /// Offsets within a vertex. Direction (2), point on the light (2): together in one block, whose first
+    /// two and last two numbers are each well spread.
+    pub const DIRECTIONS: u32 = 0;
+    /// Choice of the light (1), of the lobe (1), Russian roulette (1).
+    pub const CHOICES: u32 = 1;
 }
 
 /// How the points of a pixel are laid out.
@@ -58,16 +59,17 @@ const SOBOL_POINTS: u64 = 1 << 16;
 
 impl Sampler {
     /// `pixel` is any number that is unique to the pixel, `sample` counts all samples of the pixel and
-    /// `replicates` is R of the module's description (at least 1).
+    /// `replicates` is R of the module's description, a power of two.
     #[inline]
     pub fn new(kind: SamplerKind, seed: u64, pixel: u64, sample: u64, replicates: u32) -> Sampler {
-        let replicates = u64::from(replicates);
-        let stream = mix(mix(seed ^ 0x6c75_7865_6c00_0001).wrapping_add(pixel))
-            .wrapping_add(sample % replicates);
+        debug_assert!(replicates.is_power_of_two());
+        let replicate = sample & u64::from(replicates - 1);
+        let stream =
+            mix(mix(seed ^ 0x6c75_7865_6c00_0001).wrapping_add(pixel)).wrapping_add(replicate);
         Sampler {
             kind,
             stream: mix(stream),
-            index: sample / replicates,
+            index: sample >> replicates.trailing_zeros(),
         }
     }
 

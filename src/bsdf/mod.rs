@@ -164,6 +164,12 @@ impl Bsdf {
         !matches!(self, Bsdf::Diffuse(_) | Bsdf::RoughConductor(_))
     }
 
+    /// Whether [`Bsdf::sample`] uses `u_lobe`.
+    #[inline]
+    pub fn has_lobes(&self) -> bool {
+        matches!(self, Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_))
+    }
+
     /// Nothing but a diffuse lobe: irradiance is all there is to know of the light that arrives.
     #[inline]
     pub fn is_diffuse(&self) -> bool {

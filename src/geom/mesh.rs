@@ -190,11 +190,30 @@ impl Mesh {
 
     /// Unit normal of triangle `prim` by its winding, turned by `flip_normals`; +z when degenerate.
     pub fn face_normal(&self, prim: u32) -> Vec3 {
-        let n = self.scaled_normal(prim).normalize_or(DVec3::Z).as_vec3();
+        let [p0, p1, p2] = self.triangle(prim);
+        let n = self.unit_normal(p1 - p0, p2 - p0, prim);
         if self.flip_normals { -n } else { n }
     }
 
+    /// The direction of `e1` x `e2`, the edges of triangle `prim`.
+    #[inline]
+    fn unit_normal(&self, e1: Vec3, e2: Vec3, prim: u32) -> Vec3 {
+        let n = e1.cross(e2);
+        let (len2, edges2) = (
+            n.length_squared(),
+            e1.length_squared() * e2.length_squared(),
+        );
+        // In f32 the direction errs by about the rounding over the sine of the angle between the edges,
+        // and squares of areas leave the range early.
+        if len2 > 1e-4 * edges2 && len2 > 1e-30 && len2 < 1e30 {
+            n / len2.sqrt()
+        } else {
+            self.scaled_normal(prim).normalize_or(DVec3::Z).as_vec3()
+        }
+    }
+
     /// Normal times twice the area.
+    #[cold]
     fn scaled_normal(&self, prim: u32) -> DVec3 {
         let [p0, p1, p2] = self.triangle(prim).map(|p| p.as_dvec3());
         (p1 - p0).cross(p2 - p0)
@@ -230,47 +249,60 @@ impl Mesh {
         }
     }
 
-    /// Position and its error bound. The position is summed in f64, so its own error is one rounding.
-    /// The bound also covers [`fp::PLANE_ERROR`]: a ray that starts on a large triangle must not meet
-    /// it again, even where a coordinate of the whole triangle, and with it the rounding, is zero.
-    fn point(&self, prim: u32, b: Vec2) -> (Vec3, Vec3) {
-        let p = self.triangle(prim);
-        let [p0, p1, p2] = p.map(|p| p.as_dvec3());
-        let (b1, b2) = (b.x as f64, b.y as f64);
-        let at = (p0 + (p1 - p0) * b1 + (p2 - p0) * b2).as_vec3();
-        let extent = (p[1] - p[0]).abs().max((p[2] - p[0]).abs()).max_element();
-        (at, at.abs() * fp::gamma(2) + extent * fp::PLANE_ERROR)
+    /// Position and its error bound from a corner, the edges from it and the weights `(b1, b2)`.
+    ///
+    /// The sum takes four roundings of numbers no larger than corner plus edges, its use as an origin a
+    /// fifth; errors of the weights
+    /// move the point within the plane, which does no harm. The bound also covers [`fp::PLANE_ERROR`]: a
+    /// ray that starts on a large triangle must not meet it again, even where a coordinate of the whole
+    /// triangle, and with it the rounding, is zero.
+    #[inline]
+    fn point(p0: Vec3, e1: Vec3, e2: Vec3, b: Vec2) -> (Vec3, Vec3) {
+        let at = p0 + (e1 * b.x + e2 * b.y);
+        let extent = e1.abs().max(e2.abs());
+        let p_err = (p0.abs() + extent) * fp::gamma(5) + extent.max_element() * fp::PLANE_ERROR;
+        (at, p_err)
     }
 
     /// dp/du and dp/dv of triangle `prim`: constant over it. Without texture coordinates the two edges
     /// from the first corner; zero where the texture coordinates are degenerate.
     pub fn dp_duv(&self, prim: u32) -> (Vec3, Vec3) {
-        let [p0, p1, p2] = self.triangle(prim).map(|p| p.as_dvec3());
+        let [p0, p1, p2] = self.triangle(prim);
         let (e1, e2) = (p1 - p0, p2 - p0);
         if self.uvs.is_empty() {
-            return (e1.as_vec3(), e2.as_vec3());
+            return (e1, e2);
         }
-        let [t0, t1, t2] = self.indices[prim as usize].map(|i| self.uvs[i as usize].as_dvec2());
+        let [t0, t1, t2] = self.indices[prim as usize].map(|i| self.uvs[i as usize]);
         let (d1, d2) = (t1 - t0, t2 - t0);
         let det = d1.x * d2.y - d1.y * d2.x;
-        if det == 0.0 || !det.is_finite() {
+        let inverse = 1.0 / det;
+        if det == 0.0 || !inverse.is_finite() {
             return (Vec3::ZERO, Vec3::ZERO);
         }
         (
-            ((e1 * d2.y - e2 * d1.y) / det).as_vec3(),
-            ((e2 * d1.x - e1 * d2.x) / det).as_vec3(),
+            (e1 * d2.y - e2 * d1.y) * inverse,
+            (e2 * d1.x - e1 * d2.x) * inverse,
         )
     }
 
+    #[inline]
     pub(super) fn hit(&self, ray: &Ray, raw: &RawHit) -> Hit {
-        let (p, p_err) = self.point(raw.prim, raw.uv);
-        let ng = self.face_normal(raw.prim);
+        let [p0, p1, p2] = self.triangle(raw.prim);
+        let (e1, e2) = (p1 - p0, p2 - p0);
+        let (p, p_err) = Mesh::point(p0, e1, e2, raw.uv);
+        let n = self.unit_normal(e1, e2, raw.prim);
+        let ng = if self.flip_normals { -n } else { n };
         let ns = self.shading_normal(raw.prim, raw.uv, ng);
+        let dp_du = if self.uvs.is_empty() {
+            e1
+        } else {
+            self.dp_duv(raw.prim).0
+        };
         Hit {
             p,
             p_err,
             ng,
-            frame: Frame::from_tangent(ns, self.dp_duv(raw.prim).0),
+            frame: Frame::from_tangent(ns, dp_du),
             uv: self.uv(raw.prim, raw.uv),
             wo: -ray.d,
             shape: raw.shape,
@@ -280,7 +312,8 @@ impl Mesh {
 
     /// The surface at weights `(b1, b2)` of triangle `prim`, drawn with density 1/area per m².
     pub(crate) fn surface_sample(&self, prim: u32, b: Vec2) -> SurfaceSample {
-        let (p, p_err) = self.point(prim, b);
+        let [p0, p1, p2] = self.triangle(prim);
+        let (p, p_err) = Mesh::point(p0, p1 - p0, p2 - p0, b);
         let ng = self.face_normal(prim);
         SurfaceSample {
             p,

@@ -4,8 +4,9 @@
 //! triangle) and the part is near enough for it to matter, its area otherwise. Density and sample make
 //! that choice from the same numbers, so they always agree.
 
-use crate::geom::{Disk, Geometry, Mesh, ShapeId, Sphere, SurfaceSample};
-use crate::math::warp::{self, SphericalRectangle, SphericalTriangle};
+use super::rectangle::Rectangle;
+use crate::geom::{Disk, Endpoint, Geometry, ShapeId, Sphere, SurfaceSample};
+use crate::math::warp::{self, SphericalTriangle};
 use crate::math::{Aabb, DVec3, Frame, Vec2, Vec3};
 
 /// A part of an emitting surface that is sampled as one.
@@ -15,12 +16,11 @@ pub(crate) enum Part {
         shape: ShapeId,
         prim: u32,
     },
-    /// Triangles `prim` and `prim + 1` of a mesh, which make up a rectangle; `corners` are their
-    /// vertices at its right angles, off the shared edge.
+    /// Triangles `prim` and `prim + 1` of a mesh, which make up a rectangle.
     Rectangle {
         shape: ShapeId,
         prim: u32,
-        corners: [u8; 2],
+        rectangle: Rectangle,
     },
     /// A sphere, disk or cylinder.
     Whole {
@@ -28,10 +28,10 @@ pub(crate) enum Part {
     },
 }
 
-/// A point of a part, chosen for a receiver.
+/// A shining point of a part, chosen for a receiver.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Towards {
-    pub at: SurfaceSample,
+    pub end: Endpoint,
     /// Unit direction from the receiver.
     pub wi: Vec3,
     pub dist: f32,
@@ -70,11 +70,11 @@ pub(crate) fn parts_of(shape: ShapeId, geometry: &Geometry) -> Vec<Part> {
     let mut parts = Vec::new();
     let mut prim = 0;
     while prim < count {
-        if let Some(corners) = rectangle_corners(mesh, prim) {
+        if let Some(rectangle) = Rectangle::of_mesh(mesh, prim) {
             parts.push(Part::Rectangle {
                 shape,
                 prim,
-                corners,
+                rectangle,
             });
             prim += 2;
         } else {
@@ -83,72 +83,6 @@ pub(crate) fn parts_of(shape: ShapeId, geometry: &Geometry) -> Vec<Part> {
         }
     }
     parts
-}
-
-/// Whether triangles `prim` and `prim + 1` are the two halves of a rectangle, up to a few roundings of
-/// its corners: the vertices at its right angles that they do not share.
-fn rectangle_corners(mesh: &Mesh, prim: u32) -> Option<[u8; 2]> {
-    if prim as usize + 1 >= mesh.indices().len() {
-        return None;
-    }
-    let (a, b) = (mesh.triangle(prim), mesh.triangle(prim + 1));
-    let at = |t: &[Vec3; 3], k: usize| t[k % 3].as_dvec3();
-    (0..9).map(|i| (i / 3, i % 3)).find_map(|(i, j)| {
-        let (q, ex, ey) = (
-            at(&a, i),
-            at(&a, i + 1) - at(&a, i),
-            at(&a, i + 2) - at(&a, i),
-        );
-        let (lx, ly) = (ex.length(), ey.length());
-        let tolerance = 1e-6 * lx.min(ly);
-        let right = ex.dot(ey).abs() <= 1e-6 * lx * ly && tolerance > 0.0;
-        let same = |p: DVec3, q: DVec3| (p - q).length() <= tolerance;
-        let fits = same(at(&b, j), q + ex + ey)
-            && same(at(&b, j + 1), q + ey)
-            && same(at(&b, j + 2), q + ex);
-        (right && fits).then_some([i as u8, j as u8])
-    })
-}
-
-/// A rectangle `corner + s ex + t ey`, s and t in [0,1].
-struct Rect {
-    corner: Vec3,
-    ex: Vec3,
-    ey: Vec3,
-}
-
-impl Rect {
-    fn new(mesh: &Mesh, prim: u32, corner: u8) -> Rect {
-        let t = mesh.triangle(prim);
-        let at = |k: u8| t[((corner + k) % 3) as usize];
-        Rect {
-            corner: at(0),
-            ex: at(1) - at(0),
-            ey: at(2) - at(0),
-        }
-    }
-
-    /// How it looks from `eye`, if that is worth sampling by solid angle.
-    fn seen(&self, eye: Vec3) -> Option<SphericalRectangle> {
-        let d = self.corner + 0.5 * (self.ex + self.ey) - eye;
-        let extent2 = self.ex.length_squared() + self.ey.length_squared();
-        (extent2 > FAR2 * d.length_squared())
-            .then(|| SphericalRectangle::new(self.corner, self.ex, self.ey, eye))
-            .flatten()
-    }
-
-    fn pdf_a(&self) -> f32 {
-        let (x, y) = (self.ex.as_dvec3(), self.ey.as_dvec3());
-        bounded(1.0 / x.cross(y).length())
-    }
-}
-
-/// Barycentric weights (b1, b2) where the vertices after `corner` weigh `next` and `previous`.
-fn weights(corner: u8, next: f32, previous: f32) -> Vec2 {
-    let mut w = [(1.0 - next - previous).max(0.0); 3];
-    w[(corner as usize + 1) % 3] = next;
-    w[(corner as usize + 2) % 3] = previous;
-    Vec2::new(w[1], w[2])
 }
 
 fn seen_triangle([a, b, c]: [Vec3; 3], eye: Vec3) -> Option<SphericalTriangle> {
@@ -195,20 +129,18 @@ impl Part {
                     None => connect(m.surface_sample(prim, warp::triangle(u)), eye, by_area),
                 }
             }
-            (Part::Rectangle { prim, corners, .. }, Geometry::Mesh(m)) => {
-                let rect = Rect::new(m, prim, corners[0]);
-                let seen = rect.seen(eye);
-                let st = seen.map_or(u, |r| r.sample(u));
-                let mut at = if st.x + st.y <= 1.0 {
-                    m.surface_sample(prim, weights(corners[0], st.x, st.y))
-                } else {
-                    m.surface_sample(prim + 1, weights(corners[1], 1.0 - st.x, 1.0 - st.y))
-                };
-                at.pdf_a = rect.pdf_a();
-                match seen {
-                    Some(r) => connect(at, eye, |_, d| r.pdf(d)),
-                    None => connect(at, eye, by_area),
-                }
+            (Part::Rectangle { rectangle, .. }, _) => {
+                let s = rectangle.sample(eye, u)?;
+                Some(Towards {
+                    end: Endpoint {
+                        p: s.p,
+                        p_err: rectangle.p_err,
+                        ng: rectangle.ng,
+                    },
+                    wi: s.wi,
+                    dist: s.dist,
+                    pdf: s.pdf,
+                })
             }
             (Part::Whole { .. }, Geometry::Sphere(s)) => sample_sphere(s, eye, u),
             _ => connect(g.sample_area(0, u), eye, by_area),
@@ -226,13 +158,7 @@ impl Part {
                     None => by_area(m.triangle_area(prim)),
                 }
             }
-            (Part::Rectangle { prim, corners, .. }, Geometry::Mesh(m)) => {
-                let rect = Rect::new(m, prim, corners[0]);
-                match rect.seen(eye) {
-                    Some(seen) => bounded(seen.pdf(d) as f64),
-                    None => pdf_a_to_sr(rect.pdf_a(), d, ng),
-                }
-            }
+            (Part::Rectangle { rectangle, .. }, _) => rectangle.pdf(eye, p),
             (Part::Whole { .. }, Geometry::Sphere(s)) => match sphere_view(s, eye) {
                 SphereView::Outside { height, .. } => bounded(cone_pdf(height)),
                 SphereView::Inside => UNIFORM_SPHERE as f32,
@@ -272,6 +198,14 @@ fn by_area(at: &SurfaceSample, d: Vec3) -> f32 {
     pdf_a_to_sr(at.pdf_a, d, at.ng)
 }
 
+fn end_of(at: &SurfaceSample) -> Endpoint {
+    Endpoint {
+        p: at.p,
+        p_err: at.p_err,
+        ng: at.ng,
+    }
+}
+
 /// The connection from `eye` to a sampled point. `None` where the density is not an ordinary number:
 /// seen edge on, where nothing is emitted, or at no distance.
 fn connect(
@@ -282,8 +216,9 @@ fn connect(
     let d = at.p - eye;
     let wi = d.as_dvec3().try_normalize()?.as_vec3();
     let pdf = pdf(&at, d);
-    (pdf > 0.0 && pdf < f32::MAX).then(|| Towards {
-        at,
+    let shines = at.ns.dot(wi) < 0.0;
+    (shines && pdf > 0.0 && pdf < f32::MAX).then(|| Towards {
+        end: end_of(&at),
         wi,
         dist: d.as_dvec3().length() as f32,
         pdf,
@@ -377,10 +312,11 @@ fn sample_sphere(s: &Sphere, eye: Vec3, u: Vec2) -> Option<Towards> {
     };
     let at = s.surface_sample(normal);
     let dist = (at.p - eye).as_dvec3().length() as f32;
-    let pdf = bounded(pdf);
-    (dist > 0.0 && pdf < f32::MAX).then(|| Towards {
-        at,
-        wi: wi.as_vec3(),
+    let (wi, pdf) = (wi.as_vec3(), bounded(pdf));
+    let shines = at.ns.dot(wi) < 0.0;
+    (shines && dist > 0.0 && pdf < f32::MAX).then(|| Towards {
+        end: end_of(&at),
+        wi,
         dist,
         pdf,
     })

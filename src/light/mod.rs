@@ -6,6 +6,7 @@
 
 pub mod env;
 mod local;
+mod rectangle;
 mod tree;
 
 pub use env::{EnvError, EnvMap};
@@ -360,16 +361,10 @@ impl Lights {
             What::Part { part, radiance } => {
                 let s = part.sample(geoms.get(part.shape().0 as usize)?, from.p, u)?;
                 let pdf = s.pdf * prob;
-                // Only the side of the shading normal shines.
-                let shines = s.at.ns.dot(s.wi) < 0.0 && pdf > 0.0;
-                shines.then_some(EmitterSample {
+                (pdf > 0.0).then_some(EmitterSample {
                     wi: s.wi,
                     dist: s.dist,
-                    end: Some(Endpoint {
-                        p: s.at.p,
-                        p_err: s.at.p_err,
-                        ng: s.at.ng,
-                    }),
+                    end: Some(s.end),
                     le: radiance,
                     density: Density::PerSr(pdf),
                     emitter,

@@ -23,27 +23,12 @@ pub const PLANE_ERROR: f32 = gamma(16);
 
 /// The origin of a ray that leaves the surface at `p` towards `w`: moved along `ng` out of the box of
 /// half-width `p_err` around `p`, to the side of `w`, so that the ray cannot meet the surface it
-/// leaves. Each coordinate is then rounded away from the surface (Pharr, Jakob & Humphreys, section 6.8.6).
+/// leaves (Pharr, Jakob & Humphreys, section 6.8.6). The rounding of the sum must be part of `p_err`:
+/// one `gamma(1)` of each coordinate.
 #[inline]
 pub fn offset_origin(p: Vec3, p_err: Vec3, ng: Vec3, w: Vec3) -> Vec3 {
     let d = ng.abs().dot(p_err);
-    let side = if w.dot(ng) < 0.0 { -1.0 } else { 1.0 };
-    let offset = ng * (d * side);
-    let away = |p: f32, o: f32| {
-        let moved = p + o;
-        if o > 0.0 {
-            moved.next_up()
-        } else if o < 0.0 {
-            moved.next_down()
-        } else {
-            moved
-        }
-    };
-    Vec3::new(
-        away(p.x, offset.x),
-        away(p.y, offset.y),
-        away(p.z, offset.z),
-    )
+    p + ng * d.copysign(w.dot(ng))
 }
 
 /// How far along a connection of length `len` between two offset points a blocker may lie. The end
@@ -63,10 +48,12 @@ mod tests {
         for scale in [1e-6f32, 1.0, 1e6] {
             let p = Vec3::new(0.3, -1.7, 12.0) * scale;
             let p_err = p.abs() * gamma(7);
+            let rounding = p.abs() * gamma(1);
             let ng = Vec3::new(0.6, 0.0, 0.8);
             for w in [ng, -ng] {
                 let moved = offset_origin(p, p_err, ng, w) - p;
-                assert!(moved.dot(w) >= ng.abs().dot(p_err), "scale {scale}");
+                let least = ng.abs().dot(p_err - rounding);
+                assert!(moved.dot(w) >= least, "scale {scale}");
             }
         }
     }

@@ -176,6 +176,12 @@ impl Scene {
         !self.lights.is_empty()
     }
 
+    /// Whether a number decides which light is sampled.
+    #[inline]
+    pub fn lights_are_chosen(&self) -> bool {
+        self.lights.len() > 1
+    }
+
     pub fn emitters_can_be_met(&self) -> bool {
         self.emitters_can_be_met
     }

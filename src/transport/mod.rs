@@ -82,11 +82,11 @@ pub fn direct_light(
     hit: &Hit,
     bsdf: &Bsdf,
     mis: Mis,
-    numbers: [f32; 4],
+    u_pick: f32,
+    u: Vec2,
     stats: &mut PathStats,
 ) -> Rgb {
-    let [u, v, u_pick, _] = numbers;
-    let Some(light) = scene.sample_light(hit, u_pick, Vec2::new(u, v)) else {
+    let Some(light) = scene.sample_light(hit, u_pick, u) else {
         return Rgb::BLACK;
     };
     let (wo, wi) = (hit.frame.to_local(hit.wo), hit.frame.to_local(light.wi));
@@ -105,8 +105,32 @@ pub fn direct_light(
     f * light.weight() * (wi.z.abs() * weight)
 }
 
-/// The numbers of decision `which` (see [`dim`]) at path vertex `vertex`.
-#[inline]
-fn numbers_at(sampler: &Sampler, vertex: u32, which: u32) -> [f32; 4] {
-    sampler.get4(dim::VERTEX + vertex * dim::PER_VERTEX + which)
+/// The random numbers of one path vertex.
+struct VertexNumbers {
+    light: Vec2,
+    direction: Vec2,
+    pick: f32,
+    lobe: f32,
+    roulette: f32,
+}
+
+impl VertexNumbers {
+    /// The numbers of vertex `vertex`. Those for choices are drawn only where there is `any_choice`; else
+    /// they are zero.
+    #[inline]
+    fn at(sampler: &Sampler, vertex: u32, any_choice: bool) -> VertexNumbers {
+        let block = dim::VERTEX + vertex * dim::PER_VERTEX;
+        let [x, y, light_x, light_y] = sampler.get4(block + dim::DIRECTIONS);
+        let [pick, lobe, roulette, _] = match any_choice {
+            true => sampler.get4(block + dim::CHOICES),
+            false => [0.0; 4],
+        };
+        VertexNumbers {
+            light: Vec2::new(light_x, light_y),
+            direction: Vec2::new(x, y),
+            pick,
+            lobe,
+            roulette,
+        }
+    }
 }

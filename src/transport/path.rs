@@ -2,11 +2,11 @@
 
 use crate::bsdf::{Density, Mode};
 use crate::geom::{Hit, Ray};
-use crate::math::{Rgb, Vec2};
-use crate::sampler::{Sampler, dim};
+use crate::math::Rgb;
+use crate::sampler::Sampler;
 use crate::scene::Scene;
 
-use super::{Mis, PathStats, direct_light, numbers_at};
+use super::{Mis, PathStats, VertexNumbers, direct_light};
 
 /// Longest path, in path vertices after the camera, when none is asked for: longer ones are cut. Only a
 /// closed scene of albedo 1 without Russian roulette gets here.
@@ -121,27 +121,28 @@ impl PathSpec {
                 break;
             }
             let bsdf = scene.bsdf(&hit);
+            let roulette = depth + 1 >= self.rr_depth;
+            let any_choice = roulette || scene.lights_are_chosen() || bsdf.has_lobes();
+            let u = VertexNumbers::at(sampler, depth, any_choice);
             if !bsdf.is_delta() && scene.has_lights() {
                 let mis = Mis::Power {
                     bsdf_per_light: 1.0,
                 };
-                let numbers = numbers_at(sampler, depth, dim::LIGHT);
-                lo += throughput * direct_light(scene, &hit, &bsdf, mis, numbers, stats);
+                lo += throughput * direct_light(scene, &hit, &bsdf, mis, u.pick, u.light, stats);
             }
             // The last edge could only meet an emitter.
             if depth + 2 >= max_depth && !scene.emitters_can_be_met() {
                 break;
             }
             let wo = hit.frame.to_local(hit.wo);
-            let [u, v, u_lobe, u_roulette] = numbers_at(sampler, depth, dim::BSDF);
-            let Some(sample) = bsdf.sample(wo, u_lobe, Vec2::new(u, v), Mode::Radiance) else {
+            let Some(sample) = bsdf.sample(wo, u.lobe, u.direction, Mode::Radiance) else {
                 break;
             };
             throughput *= sample.weight;
             eta2 *= sample.eta * sample.eta;
-            if depth + 1 >= self.rr_depth {
+            if roulette {
                 let survival = (throughput.max_component() * eta2).min(0.95);
-                if u_roulette >= survival {
+                if u.roulette >= survival {
                     break;
                 }
                 throughput *= 1.0 / survival;
@@ -178,8 +179,9 @@ impl DirectSpec {
                 },
             };
             for i in 0..self.emitter_samples {
-                let numbers = numbers_at(sampler, i, dim::LIGHT);
-                lo += direct_light(scene, &hit, &bsdf, mis, numbers, stats) * (1.0 / n_light);
+                let u = VertexNumbers::at(sampler, i, scene.lights_are_chosen());
+                let lit = direct_light(scene, &hit, &bsdf, mis, u.pick, u.light, stats);
+                lo += lit * (1.0 / n_light);
             }
         }
         if !scene.emitters_can_be_met() {
@@ -187,8 +189,8 @@ impl DirectSpec {
         }
         let wo = hit.frame.to_local(hit.wo);
         for i in 0..self.bsdf_samples {
-            let [u, v, u_lobe, _] = numbers_at(sampler, i, dim::BSDF);
-            let Some(sample) = bsdf.sample(wo, u_lobe, Vec2::new(u, v), Mode::Radiance) else {
+            let u = VertexNumbers::at(sampler, i, bsdf.has_lobes());
+            let Some(sample) = bsdf.sample(wo, u.lobe, u.direction, Mode::Radiance) else {
                 continue;
             };
             let ray = hit.spawn(hit.frame.to_world(sample.wi));
