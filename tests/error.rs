@@ -11,7 +11,8 @@ const SIDE: u32 = 12;
 
 /// A lit corner with soft shadows everywhere and no edge in the picture.
 fn smooth_scene(sampler: &str) -> String {
-    let camera = camera(SIDE, 20.0).replace("<film", &format!(r#"<sampler type="{sampler}"/><film"#));
+    let camera =
+        camera(SIDE, 20.0).replace("<film", &format!(r#"<sampler type="{sampler}"/><film"#));
     scene(
         3,
         &camera,

@@ -18,7 +18,7 @@ const ROWS: [&[&str]; 9] = [
 
 /// Crates that only the named rooms may use. Threads (rayon) are for what loops over pixels, shapes or
 /// triangles, not for what happens at one hit.
-const CRATES: [(&str, &[&str]); 12] = [
+const CRATES: [(&str, &[&str]); 11] = [
     ("obvhs", &["geom"]),
     ("rayon", &["geom", "render", "study", "format", "cli"]),
     ("serde_json", &["render", "cli"]),
@@ -27,7 +27,6 @@ const CRATES: [(&str, &[&str]); 12] = [
     ("exr", &["image_io"]),
     ("image", &["image_io"]),
     ("roxmltree", &["format"]),
-    ("tobj", &["format"]),
     ("clap", &["cli"]),
     ("indicatif", &["cli"]),
     ("ctrlc", &["cli"]),

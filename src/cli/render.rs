@@ -144,9 +144,7 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
         eprintln!("warning: {warning}");
     }
     let outputs = outputs(args);
-    outputs
-        .iter()
-        .try_for_each(Image::check_target)?;
+    outputs.iter().try_for_each(Image::check_target)?;
     args.stats
         .iter()
         .try_for_each(|path| image_io::check_writable(path))?;

@@ -80,15 +80,16 @@ impl Scene {
                 .enumerate()
                 .map(|(i, g)| (ShapeId(i as u32), g))
         };
-        let mesh = |(shape, g)| match g {
-            Geometry::Mesh(m) => Some(MeshRef {
-                shape,
-                positions: m.positions(),
-                indices: m.indices(),
-            }),
-            _ => None,
-        };
-        let meshes: Vec<MeshRef> = shapes().filter_map(mesh).collect();
+        let meshes: Vec<MeshRef> = shapes()
+            .filter_map(|(shape, g)| match g {
+                Geometry::Mesh(m) => Some(MeshRef {
+                    shape,
+                    positions: m.positions(),
+                    indices: m.indices(),
+                }),
+                _ => None,
+            })
+            .collect();
         let others: Vec<_> = shapes()
             .filter(|(_, g)| !matches!(g, Geometry::Mesh(_)))
             .map(|(id, g)| (id, g.bounds()))
