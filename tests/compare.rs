@@ -332,7 +332,10 @@ fn the_command_reads_the_standard_errors_of_our_files() {
     folder.save("plain.exr", &rendered(10, SPP, 1.0, false));
     let outcome = |line: &str| folder.run(line).unwrap().outcome();
     assert_eq!(outcome("right.exr reference.exr --stderr"), Outcome::Done);
-    assert_eq!(outcome("dark.exr reference.exr --stderr"), Outcome::TestFailed);
+    assert_eq!(
+        outcome("dark.exr reference.exr --stderr"),
+        Outcome::TestFailed
+    );
     assert_eq!(
         folder.failure("plain.exr reference.exr --stderr"),
         ("--stderr: plain.exr has no layer \"stderr\"".to_string(), 2)

@@ -9,11 +9,11 @@ use serde_json::{Value, json};
 
 use super::{Failure, Outcome};
 use crate::image_io::Image;
+use crate::study::Picture;
 use crate::study::error_map::{error_map, signed_difference};
 use crate::study::flip;
 use crate::study::metrics::Metrics;
 use crate::study::z_test::{BiasTest, Noise, Rule, Verdict, z_test};
-use crate::study::Picture;
 
 /// Samples per pixel of the references that come with a variance per sample, unless told otherwise.
 const USUAL_REFERENCE_SPP: f64 = 32_000.0;
@@ -131,8 +131,7 @@ pub fn compare(args: &CompareArgs) -> Result<Report, Failure> {
             } else {
                 (signed_difference(&image, &reference), None)
             };
-            Image::from_rgb(picture.width, picture.height, &picture.pixels)
-                .write(path)?;
+            Image::from_rgb(picture.width, picture.height, &picture.pixels).write(path)?;
             Some((path.clone(), scale))
         }
         _ => None,

@@ -67,8 +67,10 @@ pub fn film(sensor: &Props, overrides: &Overrides) -> Result<Film, SceneError> {
     if let Some(resolution) = overrides.resolution {
         if crop.is_some() && overrides.crop.is_none() {
             let what = "the film has a crop window, which a new resolution makes meaningless";
-            return Err(film_error(props.as_ref().unwrap_or(sensor), overrides, what)
-                .with_help("give --crop too"));
+            return Err(
+                film_error(props.as_ref().unwrap_or(sensor), overrides, what)
+                    .with_help("give --crop too"),
+            );
         }
         size = resolution;
     }

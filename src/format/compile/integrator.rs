@@ -63,8 +63,9 @@ pub fn integrator(
     for name in &overrides.aovs {
         let Some((_, aov)) = LAYERS.iter().find(|(n, _)| n == name) else {
             let what = format!("unknown layer \"{name}\"");
-            return Err(on_command_line("--aov", name, what)
-                .with_help(suggest(name, LAYERS.map(|l| l.0))));
+            return Err(
+                on_command_line("--aov", name, what).with_help(suggest(name, LAYERS.map(|l| l.0)))
+            );
         };
         layers.push(AovLayer {
             name: name.clone(),
@@ -185,7 +186,10 @@ fn aov_layers(props: &Props, layers: &mut Vec<AovLayer>) -> Result<(), SceneErro
         check_name(name).map_err(|what| props.error_at("aovs", what))?;
         let Some((_, aov)) = TYPES.iter().find(|(n, _)| *n == kind) else {
             let error = match UNSUPPORTED.contains(&kind) {
-                true => props.error_at("aovs", format!("output variable \"{kind}\" is not supported")),
+                true => props.error_at(
+                    "aovs",
+                    format!("output variable \"{kind}\" is not supported"),
+                ),
                 false => {
                     let what = format!("unknown type \"{kind}\" of output variable \"{name}\"");
                     props.error_at("aovs", what)
@@ -207,7 +211,9 @@ fn check_name(name: &str) -> Result<(), String> {
         return Err("an output variable has no name".to_string());
     }
     if OWN_LAYERS.contains(&name) {
-        return Err(format!("\"{name}\" is the name of a layer that every picture has"));
+        return Err(format!(
+            "\"{name}\" is the name of a layer that every picture has"
+        ));
     }
     if name.len() > LAYER_NAME_BYTES || name.chars().any(char::is_control) {
         return Err("the name of an output variable is too long, or not printable".to_string());

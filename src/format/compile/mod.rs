@@ -9,8 +9,8 @@ mod shapes;
 
 use rayon::prelude::*;
 
-use super::plugins::Category;
 use super::error::command_line;
+use super::plugins::Category;
 use super::{Props, SceneDesc, SceneError, did_you_mean, list};
 use crate::film::Window;
 use crate::render::{AovLayer, Job};
