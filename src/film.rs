@@ -37,11 +37,11 @@ const MIN_REPLICATES: u32 = 4;
 const MAX_REPLICATES: u32 = 16;
 /// Samples a replicate should have: splitting a few quasi-random points up further would cost more of
 /// their accuracy than the better knowledge of it is worth.
-const SAMPLES_PER_REPLICATE: u64 = 32;
+const SAMPLES_PER_REPLICATE: u64 = 64;
 /// Sums that may stand in memory before the number of replicates is lowered: 64 Mi sums are 1.5 GiB.
 const MAX_SUMS: u64 = 64 << 20;
 
-/// How many replicates the samples of a pixel are dealt out to: 16 from 512 samples on. `spp` is `None`
+/// How many replicates the samples of a pixel are dealt out to: 16 from 1024 samples on. `spp` is `None`
 /// when it is not known yet. Always a power of two.
 pub fn replicates(spp: Option<u64>, pixels: u64) -> u32 {
     let bounded = |n: u64| {

@@ -44,6 +44,8 @@ pub struct Roughness {
     pub shape: Shape,
     pub alpha_u: Texture,
     pub alpha_v: Texture,
+    /// Whether the two are given apart.
+    pub anisotropic: bool,
     /// Sample visible normals rather than all.
     pub visible: bool,
 }
@@ -85,6 +87,16 @@ impl Material {
                 ..Dielectric::new(*eta)
             }),
             Material::TwoSided { front, .. } => front.one_sided(uv),
+        }
+    }
+
+    /// Whether the material scatters differently along the two tangents: roughness given for each.
+    pub fn is_anisotropic(&self) -> bool {
+        match self {
+            Material::Uniform(Bsdf::RoughConductor(b)) => b.facets.alpha.x != b.facets.alpha.y,
+            Material::RoughConductor { roughness, .. } => roughness.anisotropic,
+            Material::TwoSided { front, back } => front.is_anisotropic() || back.is_anisotropic(),
+            _ => false,
         }
     }
 

@@ -18,7 +18,7 @@ fn plane_under(light: &str, integrator: &str) -> f64 {
         // So narrow that the irradiance does not vary over the picture by 1e-5.
         camera(8, 0.02)
     );
-    mean_of(&picture(&xml, 1024, 1))
+    mean_of(&picture(&xml, 8192, 1))
 }
 
 /// Camera samples of a picture of [`plane_under`].
@@ -41,7 +41,7 @@ fn check(light: &str, irradiance: f64) {
     let strategies = [PATH.to_string(), direct(1, 1), direct(1, 0), direct(3, 2)];
     for integrator in strategies {
         let got = plane_under(light, &integrator);
-        // 65,536 samples: the standard error is below 0.05 % for every strategy that uses the light.
+        // 524,288 samples: the standard error is below 0.05 % for every strategy that uses the light.
         assert!(
             (got / expected - 1.0).abs() < 2e-3,
             "{integrator}: {got}, expected {expected}"
@@ -159,9 +159,9 @@ fn furnace_of_a_closed_sphere() {
                 <bsdf type="diffuse"><rgb name="reflectance" value="{albedo}"/></bsdf>
                 <emitter type="area"><rgb name="radiance" value="1"/></emitter></shape>"#
         );
-        let got = mean_of(&picture(&scene(-1, &camera(16, 60.0), &content), 256, 2));
+        let got = mean_of(&picture(&scene(-1, &camera(16, 60.0), &content), 4096, 2));
         let expected = 1.0 / (1.0 - albedo);
-        // Roulette makes the noise: 65,536 samples, standard error below 0.06 %.
+        // Roulette makes the noise: a million samples, standard error below 0.05 %.
         assert!(
             (got / expected - 1.0).abs() < 2e-3,
             "albedo {albedo}: {got}, expected {expected}"

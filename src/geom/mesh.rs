@@ -286,23 +286,23 @@ impl Mesh {
     }
 
     #[inline]
-    pub(super) fn hit(&self, ray: &Ray, raw: &RawHit) -> Hit {
+    pub(super) fn hit(&self, ray: &Ray, raw: &RawHit, tangents: bool) -> Hit {
         let [p0, p1, p2] = self.triangle(raw.prim);
         let (e1, e2) = (p1 - p0, p2 - p0);
         let (p, p_err) = Mesh::point(p0, e1, e2, raw.uv);
         let n = self.unit_normal(e1, e2, raw.prim);
         let ng = if self.flip_normals { -n } else { n };
         let ns = self.shading_normal(raw.prim, raw.uv, ng);
-        let dp_du = if self.uvs.is_empty() {
-            e1
+        let frame = if tangents {
+            Frame::from_tangent(ns, self.dp_duv(raw.prim).0)
         } else {
-            self.dp_duv(raw.prim).0
+            Frame::from_normal(ns)
         };
         Hit {
             p,
             p_err,
             ng,
-            frame: Frame::from_tangent(ns, dp_du),
+            frame,
             uv: self.uv(raw.prim, raw.uv),
             wo: -ray.d,
             shape: raw.shape,

@@ -182,10 +182,12 @@ impl Geometry {
         }
     }
 
-    /// All that shading needs at the meeting `raw` of `ray` with this shape.
-    pub fn hit(&self, ray: &Ray, raw: &RawHit) -> Hit {
+    /// All that shading needs at the meeting `raw` of `ray` with this shape. Only with `tangents` does
+    /// the frame follow dp/du, which nothing but an anisotropic material can tell.
+    #[inline]
+    pub fn hit(&self, ray: &Ray, raw: &RawHit, tangents: bool) -> Hit {
         let point = match self {
-            Geometry::Mesh(m) => return m.hit(ray, raw),
+            Geometry::Mesh(m) => return m.hit(ray, raw, tangents),
             Geometry::Sphere(s) => s.at_hit(ray, raw.t),
             Geometry::Disk(s) => s.at_hit(ray),
             Geometry::Cylinder(s) => s.at_hit(ray, raw.t),

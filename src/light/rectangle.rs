@@ -71,8 +71,9 @@ impl Rectangle {
         let (q, ex, ey) = (0..9).map(|i| (i / 3, i % 3)).find_map(|(i, j)| {
             let (q, ex, ey) = corner(i);
             let (lx, ly) = (ex.length(), ey.length());
-            let tolerance = 1e-6 * lx.min(ly);
-            let right = ex.dot(ey).abs() <= 1e-6 * lx * ly && tolerance > 0.0;
+            // A few roundings of the corners' coordinates, which may be much larger than the edges.
+            let tolerance = f64::from(fp::gamma(8)) * (q.abs().max_element() + lx + ly);
+            let right = ex.dot(ey).abs() <= tolerance * (lx + ly) && tolerance < 1e-4 * lx.min(ly);
             let same = |p: glam::DVec3, q: glam::DVec3| (p - q).length() <= tolerance;
             let fits = same(at(&b, j), q + ex + ey)
                 && same(at(&b, j + 1), q + ey)
@@ -275,7 +276,7 @@ mod tests {
     use glam::DVec3;
 
     fn rectangle(width: f64, height: f64) -> Rectangle {
-        let place = Transform::translate(DVec3::new(0.3, -0.2, 0.0))
+        let place = Transform::translate(DVec3::new(0.3, -0.2, 0.0) * width)
             * Transform::rotate(DVec3::new(1.0, 0.4, 0.2), 40.0).unwrap()
             * Transform::scale(DVec3::new(width / 2.0, height / 2.0, 1.0)).unwrap();
         Rectangle::of_mesh(&Mesh::rectangle(&place, false), 0).unwrap()
@@ -306,7 +307,8 @@ mod tests {
                 let exact =
                     SphericalRectangle::new(r.corner, r.x * r.width, r.y * r.height, eye).unwrap();
                 let ratio = seen.solid_angle / exact.solid_angle();
-                assert!((ratio - 1.0).abs() < 1e-4, "{w} x {h} from {eye}: {ratio}");
+                // Close to the plane the solid angle nears a half space and its tangent loses digits.
+                assert!((ratio - 1.0).abs() < 5e-4, "{w} x {h} from {eye}: {ratio}");
                 for i in 0..100 {
                     let u = Vec2::new((i % 10) as f32 / 10.0 + 0.03, (i / 10) as f32 / 10.0 + 0.07);
                     let (got, want) = (seen.sample(u), exact.sample(u));

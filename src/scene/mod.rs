@@ -41,6 +41,8 @@ pub struct Scene {
     accel: Accel,
     /// Whether any shape is no mesh.
     has_analytic: bool,
+    /// Whether shading frames must follow dp/du.
+    tangents: bool,
     center: DVec3,
     plan: Plan,
 }
@@ -97,6 +99,15 @@ impl Scene {
         let accel = Accel::build(&meshes, &others);
         let has_analytic = !others.is_empty();
         let emitters_can_be_met = emitters.iter().any(|e| !matches!(e, Emitter::Point { .. }));
+        let tangents = materials.iter().any(Material::is_anisotropic);
+        match tangents {
+            true => plan.add(
+                "tangents",
+                "shading frames follow the texture coordinates",
+                "a material is anisotropic",
+            ),
+            false => plan.add("tangents", "none", "no material is anisotropic"),
+        }
         let lights = Lights::new(emitters, &geometries);
         plan_of_scene(&mut plan, &lights, has_analytic, emitters_can_be_met);
         Scene {
@@ -107,6 +118,7 @@ impl Scene {
             emitters_can_be_met,
             accel,
             has_analytic,
+            tangents,
             center,
             plan,
         }
@@ -120,7 +132,7 @@ impl Scene {
         } else {
             self.accel.intersect(ray)
         }?;
-        Some(self.geometries[raw.shape.0 as usize].hit(ray, &raw))
+        Some(self.geometries[raw.shape.0 as usize].hit(ray, &raw, self.tangents))
     }
 
     /// Whether anything stands in the way of `ray`.

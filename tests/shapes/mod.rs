@@ -14,7 +14,7 @@ pub fn intersect_as(shape: u32, g: &Geometry, ray: &Ray) -> Option<Hit> {
     };
     let Geometry::Mesh(m) = g else {
         let (t, uv) = g.intersect_analytic(ray, ray.t_max)?;
-        return Some(g.hit(ray, &raw(t, 0, uv)));
+        return Some(g.hit(ray, &raw(t, 0, uv), true));
     };
     let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
     let mut best: Option<RawHit> = None;
@@ -30,7 +30,7 @@ pub fn intersect_as(shape: u32, g: &Geometry, ray: &Ray) -> Option<Hit> {
             best = Some(raw(t as f32, prim, Vec2::new(b1 as f32, b2 as f32)));
         }
     }
-    best.map(|b| g.hit(ray, &b))
+    best.map(|b| g.hit(ray, &b, true))
 }
 
 pub fn scale(x: f64, y: f64, z: f64) -> Transform {

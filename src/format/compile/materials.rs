@@ -134,6 +134,7 @@ impl<'a> Materials<'a> {
                 };
                 let roughness = Roughness {
                     shape,
+                    anisotropic: p.is_given("alpha_u"),
                     alpha_u,
                     alpha_v,
                     visible: p.bool("sample_visible")?,
