@@ -173,6 +173,7 @@ impl Mesh {
     }
 
     /// The three corners of triangle `prim`.
+    #[inline]
     pub fn triangle(&self, prim: u32) -> [Vec3; 3] {
         self.indices[prim as usize].map(|i| self.positions[i as usize])
     }
@@ -189,6 +190,7 @@ impl Mesh {
     }
 
     /// Unit normal of triangle `prim` by its winding, turned by `flip_normals`; +z when degenerate.
+    #[inline]
     pub fn face_normal(&self, prim: u32) -> Vec3 {
         let [p0, p1, p2] = self.triangle(prim);
         let n = self.unit_normal(p1 - p0, p2 - p0, prim);
@@ -220,6 +222,7 @@ impl Mesh {
     }
 
     /// Interpolated normal at weights `(b1, b2)`, turned by `flip_normals`; `ng` where there is none.
+    #[inline]
     pub fn shading_normal(&self, prim: u32, b: Vec2, ng: Vec3) -> Vec3 {
         if self.normals.is_empty() {
             return ng;
@@ -232,6 +235,7 @@ impl Mesh {
         }
     }
 
+    #[inline]
     fn interpolate<T>(&self, prim: u32, b: Vec2, at: impl Fn(usize) -> T) -> T
     where
         T: std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>,
@@ -241,6 +245,7 @@ impl Mesh {
     }
 
     /// Texture coordinates at weights `(b1, b2)`: interpolated, or the weights themselves without any.
+    #[inline]
     fn uv(&self, prim: u32, b: Vec2) -> Vec2 {
         if self.uvs.is_empty() {
             b
@@ -266,6 +271,7 @@ impl Mesh {
 
     /// dp/du and dp/dv of triangle `prim`: constant over it. Without texture coordinates the two edges
     /// from the first corner; zero where the texture coordinates are degenerate.
+    #[inline]
     pub fn dp_duv(&self, prim: u32) -> (Vec3, Vec3) {
         let [p0, p1, p2] = self.triangle(prim);
         let (e1, e2) = (p1 - p0, p2 - p0);

@@ -119,6 +119,7 @@ impl Part {
     }
 
     /// A point to connect to from `eye`. `None` when the part cannot be seen from there at this point.
+    #[inline]
     pub fn sample(&self, g: &Geometry, eye: Vec3, u: Vec2) -> Option<Towards> {
         match (*self, g) {
             (Part::Triangle { prim, .. }, Geometry::Mesh(m)) => {

@@ -55,6 +55,7 @@ pub struct EmitterSample {
 
 impl EmitterSample {
     /// The estimate of incident radiance before the cosine and without MIS: `le` over the density.
+    #[inline]
     pub fn weight(&self) -> Rgb {
         match self.density {
             Density::PerSr(pdf) => self.le / pdf,
@@ -63,6 +64,7 @@ impl EmitterSample {
     }
 
     /// The ray that is blocked if the light is in shadow.
+    #[inline]
     pub fn shadow_ray(&self, from: &Hit) -> Ray {
         match &self.end {
             Some(end) => from.spawn_to(end),
@@ -303,6 +305,7 @@ impl Lights {
 
     /// A connection from `from` to one of the lights. `u_pick` and `u` in [0,1); `u_pick` is not used
     /// where there is but one light. `None` when the chosen light sends nothing here.
+    #[inline]
     pub fn sample(
         &self,
         geoms: &[Geometry],
@@ -345,6 +348,7 @@ impl Lights {
         })
     }
 
+    #[inline]
     fn sample_local(
         &self,
         geoms: &[Geometry],
