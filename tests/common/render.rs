@@ -36,6 +36,40 @@ pub fn picture(xml: &str, spp: u64, seed: u64) -> Vec<[f64; 3]> {
     render(&compile_with(xml, &overrides), spp).0.mean()
 }
 
+/// Mean over the picture of channel 0 and its standard error (pixels are independent), from `spp` samples
+/// per pixel or as many times twice that as it takes to see 1 % clearly.
+pub fn mean_and_error(xml: &str, spp: u64, seed: u64) -> (f64, f64) {
+    let overrides = Overrides {
+        seed: Some(seed),
+        ..Overrides::default()
+    };
+    let (film, _) = render(&compile_with(xml, &overrides), spp);
+    let variances = film.standard_error().into_iter().map(|s| s[0] * s[0]);
+    let mean = mean_of(&film.mean());
+    let stderr = variances.sum::<f64>().sqrt() / film.mean().len() as f64;
+    if stderr > MAX_ERROR * mean && spp < 1 << 14 {
+        return mean_and_error(xml, 2 * spp, seed);
+    }
+    (mean, stderr)
+}
+
+/// Relative standard error of [`mean_and_error`].
+const MAX_ERROR: f64 = 1.5e-3;
+
+/// Fails where chance does not explain the distance of a picture's mean from its closed form: beyond 4.5
+/// standard errors (once in 150,000) and the rounding of f32; or where an error of 1 % could hide.
+#[track_caller]
+pub fn assert_explained((mean, stderr): (f64, f64), expected: f64, what: &str) {
+    assert!(
+        stderr <= 1.1 * MAX_ERROR * expected,
+        "{what}: {mean} +- {stderr} says too little"
+    );
+    assert!(
+        (mean - expected).abs() < 4.5 * stderr + 2e-5 * expected,
+        "{what}: {mean} +- {stderr}, expected {expected}"
+    );
+}
+
 /// A camera at (0, 0, 4) that looks down -z, `size` pixels square, box filter.
 pub fn camera(size: u32, fov: f64) -> String {
     format!(
