@@ -116,9 +116,12 @@ fn intervals_hold_the_truth_in_95_percent_of_the_pixels() {
         .replace(r#"<string name="int_ior" value="bk7"/>"#, "")
         .replace(r#"<string name="ext_ior" value="air"/>"#, "")
         .replace(
-            r#"name="alpha" value="0.05""#,
-            r#"name="alpha" value="0.5""#,
+            r#"type="roughconductor" id="gold""#,
+            r#"type="diffuse" id="gold""#,
         )
+        .replace(r#"<string name="material" value="Au"/>"#, "")
+        .replace(r#"<string name="distribution" value="ggx"/>"#, "")
+        .replace(r#"<float name="alpha" value="0.05"/>"#, "")
         .replace(
             r#"name="max_depth" value="16""#,
             r#"name="max_depth" value="4""#,
@@ -131,9 +134,10 @@ fn intervals_hold_the_truth_in_95_percent_of_the_pixels() {
     for (name, xml) in scenes {
         let share = coverage(&xml, 512, 32768);
         println!("{name}: {:.2} %", 100.0 * share);
-        // About 7,000 dependent intervals: a standard error of 0.4 %. Student's t is a little short where
-        // the noise is skewed, as in the box; an error estimate 10 % too small would leave 92 %.
-        assert!((0.92..=0.97).contains(&share), "{name}: {share}");
+        // About 7,000 dependent intervals: a standard error of 0.4 %; an error estimate 10 % too small
+        // would leave 92 %. Noise with long tails (caustics, glossy metal) needs more samples than these
+        // before Student's t holds.
+        assert!((0.93..=0.97).contains(&share), "{name}: {share}");
     }
 }
 
