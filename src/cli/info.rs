@@ -98,8 +98,8 @@ fn facts(job: &Job, spp: u64) -> Vec<(&'static str, String)> {
         (
             "memory",
             format!(
-                "{:.1} MB for geometry and its hierarchy",
-                counts.geometry_bytes as f64 / 1e6
+                "{} for geometry and its hierarchy",
+                human_bytes(counts.geometry_bytes)
             ),
         ),
     ];
@@ -111,4 +111,14 @@ fn facts(job: &Job, spp: u64) -> Vec<(&'static str, String)> {
         facts.insert(1, ("crop", text));
     }
     facts
+}
+
+/// `312 bytes`, `4.2 kB`, `1.7 MB`, `3.0 GB`.
+fn human_bytes(n: usize) -> String {
+    match n as f64 {
+        b if b < 1e3 => format!("{n} bytes"),
+        b if b < 1e6 => format!("{:.1} kB", b / 1e3),
+        b if b < 1e9 => format!("{:.1} MB", b / 1e6),
+        b => format!("{:.1} GB", b / 1e9),
+    }
 }
