@@ -130,3 +130,63 @@ fn long_paths_in_a_mirror_box_end_right() {
     let expected = 0.5 * f64::from(bounces);
     assert!((mean / expected - 1.0).abs() < 1e-4, "{mean} {expected}");
 }
+
+#[test]
+fn rays_leave_the_large_triangles_they_start_on() {
+    use luxel::geom::{Accel, Endpoint, Geometry, Mesh, MeshRef, Ray, ShapeId};
+    use luxel::math::{DVec3, Frame, Transform, Vec2, Vec3, warp};
+    use luxel::sampler::{Sampler, SamplerKind};
+
+    // A wall in a coordinate plane: there one coordinate of every corner is zero, and so is its rounding.
+    for (scale, axis) in [
+        (1.0, DVec3::Y),
+        (559.2, DVec3::Y),
+        (559.2, DVec3::X),
+        (1e5, DVec3::new(0.3, 1.0, 0.2)),
+    ] {
+        let place =
+            Transform::rotate(axis, 90.0).unwrap() * Transform::scale(DVec3::splat(scale)).unwrap();
+        let geometry = Geometry::Mesh(Mesh::rectangle(&place, false));
+        let Geometry::Mesh(mesh) = &geometry else {
+            unreachable!()
+        };
+        let wall = MeshRef {
+            shape: ShapeId(0),
+            positions: mesh.positions(),
+            indices: mesh.indices(),
+        };
+        let accel = Accel::build(&[wall], &[]);
+        let normal = mesh.face_normal(0);
+        let (mut met, mut blocked) = (0, 0);
+        for i in 0..200_000 {
+            let u = Sampler::new(SamplerKind::Independent, 1, 0, i, 1).get4(0);
+            let v = Sampler::new(SamplerKind::Independent, 1, 0, i, 1).get4(1);
+            let local = DVec3::new(
+                f64::from(2.0 * u[0] - 1.0),
+                f64::from(2.0 * u[1] - 1.0),
+                0.0,
+            );
+            // Onto the wall along its normal: the hit that a walk would have there.
+            let above = (place.point(local).as_vec3()) + normal * (0.3 * scale as f32);
+            let ray = Ray::new(above, -normal);
+            let Some(raw) = accel.intersect(&ray) else {
+                continue;
+            };
+            let hit = geometry.hit(&ray, &raw, false);
+            let wi =
+                Frame::from_normal(normal).to_world(warp::cosine_hemisphere(Vec2::new(u[2], u[3])));
+            met += usize::from(accel.intersect(&hit.spawn(wi)).is_some());
+            let far = Endpoint {
+                p: above + Vec3::splat(v[0] * scale as f32),
+                p_err: Vec3::ZERO,
+                ng: Vec3::ZERO,
+            };
+            blocked += usize::from(
+                accel.occluded(&hit.spawn_to(&far))
+                    && wi.dot(normal) > 0.0
+                    && (far.p - hit.p).dot(normal) > 0.0,
+            );
+        }
+        assert_eq!((met, blocked), (0, 0), "scale {scale}, axis {axis}");
+    }
+}
