@@ -1,5 +1,8 @@
 //! What building a scene makes of its files: normals and texture coordinates of meshes, values of pictures.
 
+#[path = "common/render.rs"]
+mod render;
+
 use luxel::bsdf::Mode;
 use luxel::format::{self, Compiled, Overrides};
 use luxel::geom::{Hit, Ray};
@@ -126,4 +129,25 @@ fn pictures_never_reflect_more_than_all_or_less_than_nothing() {
     let (range, warnings) = built("below.exr");
     near(range, [0.0, 0.5]);
     assert!(warnings.is_empty(), "{warnings:?}");
+}
+
+/// Radiance of the lamp itself and of what it reflects, seen by the camera, mean over the picture.
+fn lamp(material: &str, radiance: f32) -> f64 {
+    let content = format!(
+        r#"<shape type="rectangle">{material}<emitter type="area"><rgb name="radiance" value="{radiance}"/></emitter></shape>
+        <emitter type="constant"/>"#
+    );
+    render::mean_of(&render::picture(
+        &render::scene(2, &render::camera(8, 10.0), &content),
+        256,
+        1,
+    ))
+}
+
+#[test]
+fn a_lamp_without_a_material_is_black() {
+    // As in Mitsuba 3.9.1: only shapes that do not emit are grey by default.
+    assert_eq!(lamp("", 1.0), 1.0);
+    let grey = r#"<bsdf type="diffuse"><rgb name="reflectance" value="0.5"/></bsdf>"#;
+    assert!((lamp(grey, 1.0) - 1.5).abs() < 0.01);
 }

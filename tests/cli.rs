@@ -302,12 +302,13 @@ fn impossible_scenes_exit_with_1_and_write_nothing() {
 #[test]
 fn an_unwritable_output_exits_with_3_before_rendering() {
     let folder = Folder::new("unwritable");
-    for target in ["no/such/folder/x.exr", "x.gif"] {
+    // An unknown extension is a mistake on the command line.
+    for (target, code) in [("no/such/folder/x.exr", 3), ("x.gif", 2)] {
         // The time limit would be noticed: nothing may be rendered first.
         let output = luxel(&folder.0, &["render", "-o", target, "--time", "1h"]);
         assert_eq!(
             output.status.code(),
-            Some(3),
+            Some(code),
             "{target}: {}",
             stderr(&output)
         );

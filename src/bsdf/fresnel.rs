@@ -38,6 +38,8 @@ pub fn conductor(cos: f32, eta: Rgb, k: Rgb) -> Rgb {
 
 #[inline]
 fn conductor_channel(cos: f32, eta: f32, k: f32) -> f32 {
+    // Beyond, everything is reflected to the last digit, and fourth powers would leave the range of f32.
+    let (eta, k) = (eta.min(1e9), k.min(1e9));
     let cos2 = sqr(cos.min(1.0));
     let sin2 = 1.0 - cos2;
     let ek = 2.0 * eta * k;

@@ -8,6 +8,7 @@ mod render;
 
 use std::ffi::OsString;
 use std::fmt;
+use std::io::Write;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
@@ -141,7 +142,10 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Compare(args) => compare::run(args),
         Command::Info(args) => info::run(args),
         Command::Completions { shell } => {
-            clap_complete::generate(*shell, &mut Cli::command(), "luxel", &mut std::io::stdout());
+            let mut script = Vec::new();
+            clap_complete::generate(*shell, &mut Cli::command(), "luxel", &mut script);
+            // A reader that closed the pipe has seen enough.
+            let _ = std::io::stdout().write_all(&script);
             Ok(Outcome::Done)
         }
     };

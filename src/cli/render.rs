@@ -31,15 +31,15 @@ pub struct RenderArgs {
     /// Use this sampler in place of the scene's: sobol, independent
     #[arg(long, value_name = "NAME")]
     pub sampler: Option<String>,
-    /// Samples per pixel
+    /// Samples per pixel [default: what the scene's sampler says, else 4]
     #[arg(long, value_name = "N", conflicts_with = "time", value_parser = clap::value_parser!(u64).range(1..))]
     pub spp: Option<u64>,
-    /// Render for this long: 90, 90s, 5m, 1h
+    /// Render for this long: 500ms, 90s, 5m, 1h; at least one sample per pixel is taken
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     pub time: Option<Duration>,
-    /// Seed of the random numbers
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub seed: u64,
+    /// Seed of the random numbers [default: that of the scene's sampler, else 0]
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
     /// Threads to render with [default: one per processor]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,
@@ -123,6 +123,14 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
     let stopped = Arc::new(AtomicBool::new(false));
     watch_for_interrupt(&stopped)?;
     let pool = pool(args.threads)?;
+    let outputs = outputs(args);
+    if let Some(unknown) = outputs.iter().find(|p| !Image::can_write_extension(p)) {
+        let what = format!(
+            "-o {}: the extension is not .exr, .png, .jpg, .hdr or .pfm",
+            unknown.display()
+        );
+        return Err(Failure::Usage(what));
+    }
     let start = Instant::now();
     let desc = match &args.scene {
         Some(path) => format::load(path, &args.define)?,
@@ -136,19 +144,18 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
         resolution: args.resolution,
         crop: args.crop,
         aovs: args.aov.clone(),
-        seed: Some(args.seed),
+        seed: args.seed,
     };
     let compiled = pool.install(|| format::compile(&desc, &overrides))?;
     let build = start.elapsed() - load;
     for warning in &compiled.warnings {
         eprintln!("warning: {warning}");
     }
-    let outputs = outputs(args);
+    // Better before a long rendering than after it.
     outputs.iter().try_for_each(Image::check_target)?;
     args.stats
         .iter()
         .try_for_each(|path| image_io::check_writable(path))?;
-
     let stop = match (args.spp, args.time) {
         (Some(n), _) => Stop::Spp(n),
         (None, Some(time)) => Stop::Time(time),
@@ -260,7 +267,7 @@ fn summary(film: &Film, stats: &Stats, outputs: &[PathBuf]) -> String {
         Some(e) => {
             let [value, low, high] = percent(&e);
             format!(
-                "estimated relMSE {:.3e} (95 %: {:.3e} to {:.3e}), that is {value:.2} % ({low:.2} % to {high:.2} %)",
+                "estimated relMSE {:.3e} (95 %: {:.3e} to {:.3e}), a relative error of {value:.2} % ({low:.2} % to {high:.2} %) per pixel",
                 e.relmse, e.ci95[0], e.ci95[1]
             )
         }

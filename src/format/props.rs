@@ -106,6 +106,16 @@ impl<'a> Props<'a> {
         }
     }
 
+    /// Marks everything in this object as read: it is left out as a whole.
+    pub fn ignore_all(&self) {
+        for given in &self.object().params {
+            given.read.set();
+        }
+        for child in &self.object().children {
+            child.read.set();
+        }
+    }
+
     pub fn float(&self, name: &str) -> Result<f64, SceneError> {
         self.opt_float(name)?.ok_or_else(|| self.missing(name))
     }

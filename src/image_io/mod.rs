@@ -244,6 +244,11 @@ impl Image {
             .and_then(|bytes| write_atomic(path, &bytes))
     }
 
+    /// Whether the extension of `path` is one that [`Image::write`] knows.
+    pub fn can_write_extension(path: impl AsRef<Path>) -> bool {
+        Kind::of_target(path.as_ref()).is_ok()
+    }
+
     /// Whether [`Image::write`] to `path` can be expected to work ([`check_writable`]).
     pub fn check_target(path: impl AsRef<Path>) -> Result<(), ImageError> {
         let path = path.as_ref();

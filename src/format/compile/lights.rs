@@ -1,5 +1,7 @@
 //! Emitters of shapes and of the scene.
 
+use std::collections::HashSet;
+
 use super::materials::Materials;
 use super::{out_of_reach, within_reach};
 use crate::format::plugins::Category;
@@ -13,8 +15,10 @@ pub fn lights(
     shapes: &[Props],
     materials: &mut Materials,
     center: DVec3,
+    warnings: &mut Vec<String>,
 ) -> Result<Vec<Emitter>, SceneError> {
     let mut emitters = Vec::new();
+    let mut used = HashSet::new();
     for (i, shape) in shapes.iter().enumerate() {
         for emitter in shape.children(Category::Emitter) {
             if emitter.plugin() != "area" {
@@ -27,6 +31,7 @@ pub fn lights(
                     .with_help("use \"area\", or put the emitter beside the shape"));
             }
             ignore_weight(&emitter);
+            used.insert(emitter.object_id());
             let radiance = match emitter.rgb_or_texture("radiance")? {
                 RgbOrTexture::Rgb(c) => c,
                 RgbOrTexture::Texture(id) => {
@@ -48,6 +53,15 @@ pub fn lights(
     for emitter in root.children(Category::Emitter) {
         if emitter.plugin() == "area" {
             // At the top of the file it is a definition that shapes refer to.
+            if !used.contains(&emitter.object_id()) {
+                let at = emitter.place();
+                warnings.push(format!(
+                    "{}:{}:{}: this area emitter belongs to no shape and gives no light",
+                    at.file.display(),
+                    at.line,
+                    at.column
+                ));
+            }
             continue;
         }
         ignore_weight(&emitter);

@@ -21,8 +21,8 @@ pub struct Materials<'a> {
     desc: &'a SceneDesc,
     materials: Vec<Material>,
     ids: HashMap<ObjectId, MaterialId>,
-    /// Index of the material of shapes that name none.
-    default: Option<MaterialId>,
+    /// The materials of shapes that name none: of those that reflect light, and of those that emit it.
+    default: [Option<MaterialId>; 2],
     textures: HashMap<ObjectId, Texture>,
     pictures: HashMap<(PathBuf, bool), Arc<Picture>>,
     /// What was mended, for the user to know.
@@ -35,7 +35,7 @@ impl<'a> Materials<'a> {
             desc,
             materials: Vec::new(),
             ids: HashMap::new(),
-            default: None,
+            default: [None; 2],
             textures: HashMap::new(),
             pictures: HashMap::new(),
             warnings: Vec::new(),
@@ -72,14 +72,14 @@ impl<'a> Materials<'a> {
 
     pub fn of_shape(&mut self, shape: &Props<'a>) -> Result<MaterialId, SceneError> {
         let Some(props) = shape.child(Category::Bsdf) else {
-            let id = *self.default.get_or_insert_with(|| {
-                self.materials
-                    .push(Material::Uniform(Bsdf::Diffuse(Diffuse::new(Rgb::splat(
-                        DEFAULT_REFLECTANCE,
-                    )))));
+            let emits = !shape.children(Category::Emitter).is_empty();
+            let id = self.default[usize::from(emits)].get_or_insert_with(|| {
+                let albedo = if emits { 0.0 } else { DEFAULT_REFLECTANCE };
+                let diffuse = Bsdf::Diffuse(Diffuse::new(Rgb::splat(albedo)));
+                self.materials.push(Material::Uniform(diffuse));
                 MaterialId(self.materials.len() as u32 - 1)
             });
-            return Ok(id);
+            return Ok(*id);
         };
         if let Some(id) = self.ids.get(&props.object_id()) {
             return Ok(*id);
@@ -285,7 +285,7 @@ impl<'a> Materials<'a> {
     }
 }
 
-/// Reflectance of a shape without a material, as in Mitsuba.
+/// Reflectance of a shape without a material, as in Mitsuba, unless it emits light: then it is black.
 const DEFAULT_REFLECTANCE: f32 = 0.5;
 
 /// The colours of a file, alpha left out, grey as three equal channels.

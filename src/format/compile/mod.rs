@@ -76,7 +76,7 @@ pub fn compile(desc: &SceneDesc, overrides: &Overrides) -> Result<Compiled, Scen
     for props in &shape_props {
         surfaces.push(materials.of_shape(props)?);
     }
-    let lights = lights::lights(&root, &shape_props, &mut materials, center)?;
+    let lights = lights::lights(&root, &shape_props, &mut materials, center, &mut warnings)?;
     if lights.is_empty() {
         warnings.push("the scene has no emitter, so the picture is black".to_string());
     }
@@ -132,6 +132,9 @@ fn the_sensor<'a>(root: &Props<'a>, warnings: &mut Vec<String>) -> Result<Props<
             "the scene has {} sensors: the first one is rendered",
             sensors.len()
         ));
+    }
+    for unused in sensors.iter().skip(1) {
+        unused.ignore_all();
     }
     sensors.into_iter().next().ok_or_else(|| {
         root.error("the scene has no sensor")

@@ -264,7 +264,7 @@ pub const PLUGINS: &[Plugin] = &[
                 Param::bool(
                     "sample_border",
                     false,
-                    "Sample beyond the border by the filter radius; without effect here.",
+                    "Sample beyond the border by the filter radius; luxel always does, so wide filters differ at the border where this is false.",
                 ),
                 Param::bool(
                     "compensate",

@@ -17,7 +17,12 @@ pub const PLUGINS: &[Plugin] = &[
     emitter(
         "area",
         &[
-            Param::color("radiance", Role::Emission, 1.0, "Radiance in W/(m² sr)."),
+            Param::color(
+                "radiance",
+                Role::Emission,
+                1.0,
+                "Radiance in W/(m² sr); a single colour so far.",
+            ),
             WEIGHT,
         ],
         "Light from the surface of the shape it stands in, on the side of the normal.",
