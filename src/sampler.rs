@@ -57,11 +57,6 @@ pub struct Sampler {
 /// from a new scrambling.
 const SOBOL_POINTS: u64 = 1 << 16;
 
-/// Blocks from here on are independent also with [`SamplerKind::Sobol`]: after some bounces a path depends on
-/// so many numbers that the spread of four of them no longer shows in the picture, but they cost four times
-/// as much to draw.
-const SOBOL_UNTIL: u32 = dim::VERTEX + 4 * dim::PER_VERTEX;
-
 impl Sampler {
     /// `pixel` is any number that is unique to the pixel, `sample` counts all samples of the pixel and
     /// `replicates` is R of the module's description, a power of two.
@@ -78,16 +73,25 @@ impl Sampler {
         }
     }
 
+    /// The same address with independent numbers, which cost a quarter of Sobol points to draw.
+    #[inline]
+    pub fn independent(self) -> Sampler {
+        Sampler {
+            kind: SamplerKind::Independent,
+            ..self
+        }
+    }
+
     /// Four numbers in [0,1) for the block `dim` (see [`dim`]).
     #[inline]
     pub fn get4(&self, dim: u32) -> [f32; 4] {
         let address = self.stream ^ (u64::from(dim) << 32);
         match self.kind {
-            SamplerKind::Sobol if dim < SOBOL_UNTIL => {
+            SamplerKind::Sobol => {
                 let scrambling = mix(address.wrapping_add(self.index / SOBOL_POINTS)) as u32;
                 sobol_burley::sample_4d((self.index % SOBOL_POINTS) as u32, 0, scrambling)
             }
-            _ => {
+            SamplerKind::Independent => {
                 let state = mix(address.wrapping_add(self.index));
                 let mut rng =
                     Pcg64Mcg::new((u128::from(state) << 64) | u128::from(mix(state ^ address)));

@@ -447,7 +447,7 @@ fn a_point_light_falls_off_with_the_square_of_the_distance() {
 /// Prints what each way to choose costs and gives; the source of [`luxel::light::TREE_FROM`].
 /// Run with `cargo test --release --test light -- --ignored --nocapture measure`.
 #[test]
-#[ignore = "a measurement"]
+#[ignore = "measures and prints; it checks nothing"]
 fn measure_where_the_tree_pays() {
     println!("lights  ns power  ns tree  variance power/tree  efficiency tree/power");
     for count in [2, 3, 4, 6, 8, 12, 16, 32, 64, 256, 1024] {

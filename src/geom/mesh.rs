@@ -159,11 +159,6 @@ impl Mesh {
             .collect();
     }
 
-    /// Drops the vertex normals: each triangle is shaded flat.
-    pub fn clear_vertex_normals(&mut self) {
-        self.normals = Vec::new();
-    }
-
     pub fn bounds(&self) -> Aabb {
         let mut b = Aabb::EMPTY;
         for &p in &self.positions {

@@ -12,6 +12,10 @@ use super::{Mis, PathStats, VertexNumbers, direct_light};
 /// closed scene of albedo 1 without Russian roulette gets here.
 const UNBOUNDED: u32 = 1 << 20;
 
+/// Vertices whose numbers come from the sampler. After these a path depends on so many numbers that the
+/// spread of a few of them no longer shows in the picture, and independent ones are cheaper.
+const SPREAD_VERTICES: u32 = 4;
+
 /// Settings of the path tracer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PathSpec {
@@ -123,7 +127,11 @@ impl PathSpec {
             let bsdf = scene.bsdf(&hit);
             let roulette = depth + 1 >= self.rr_depth;
             let any_choice = roulette || scene.lights_are_chosen() || bsdf.has_lobes();
-            let u = VertexNumbers::at(sampler, depth, any_choice);
+            let sampler = match depth < SPREAD_VERTICES {
+                true => *sampler,
+                false => sampler.independent(),
+            };
+            let u = VertexNumbers::at(&sampler, depth, any_choice);
             if !bsdf.is_delta() && scene.has_lights() {
                 let mis = Mis::Power {
                     bsdf_per_light: 1.0,
