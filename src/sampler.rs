@@ -20,7 +20,7 @@ pub mod dim {
     /// Offsets within a vertex. Direction (2), point on the light (2): together in one block, whose first
     /// two and last two numbers are each well spread.
     pub const DIRECTIONS: u32 = 0;
-    /// Choice of the light (1), of the lobe (1), Russian roulette (1).
+    /// Choice of the light (1), of the lobe (1), Russian roulette (1), of the material (1).
     pub const CHOICES: u32 = 1;
 }
 

@@ -17,20 +17,31 @@ pub enum Texture {
     Checkerboard(Box<Checkerboard>),
 }
 
+/// A place on a surface, as textures see it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct At {
+    /// Texture coordinates.
+    pub uv: Vec2,
+    /// Triangle of a mesh.
+    pub prim: u32,
+    /// Barycentric weights of its second and third corner.
+    pub bary: Vec2,
+}
+
 impl Texture {
     #[inline]
-    pub fn eval(&self, uv: Vec2) -> Rgb {
+    pub fn eval(&self, at: &At) -> Rgb {
         match self {
             Texture::Constant(c) => *c,
-            Texture::Bitmap(b) => b.eval(uv),
-            Texture::Checkerboard(c) => c.eval(uv),
+            Texture::Bitmap(b) => b.eval(at.uv),
+            Texture::Checkerboard(c) => c.eval(at),
         }
     }
 
     /// The one number of a scalar texture: the luminance where it has a colour.
     #[inline]
-    pub fn eval_scalar(&self, uv: Vec2) -> f32 {
-        self.eval(uv).luminance()
+    pub fn eval_scalar(&self, at: &At) -> f32 {
+        self.eval(at).luminance()
     }
 
     /// The same texture in its cheapest form: one that has a single colour becomes that colour.
@@ -187,13 +198,13 @@ pub struct Checkerboard {
 }
 
 impl Checkerboard {
-    fn eval(&self, uv: Vec2) -> Rgb {
-        let p = self.to_uv.transform_point2(uv);
+    fn eval(&self, at: &At) -> Rgb {
+        let p = self.to_uv.transform_point2(at.uv);
         let p = p - p.floor();
         if (p.x > 0.5) == (p.y > 0.5) {
-            self.color0.eval(uv)
+            self.color0.eval(at)
         } else {
-            self.color1.eval(uv)
+            self.color1.eval(at)
         }
     }
 }

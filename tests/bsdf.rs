@@ -4,8 +4,10 @@ mod common;
 
 use common::{Chi2Plan, Rng, sidak};
 use luxel::bsdf::*;
+use luxel::geom::{Hit, ShapeId};
+use luxel::material::Material;
 use luxel::math::warp::uniform_hemisphere;
-use luxel::math::{DVec3, Rgb, Vec2, Vec3};
+use luxel::math::{DVec3, Frame, Rgb, Vec2, Vec3};
 
 const SHAPES: [Shape; 2] = [Shape::Ggx, Shape::Beckmann];
 const R: Mode = Mode::Radiance;
@@ -363,22 +365,40 @@ fn sides() {
         }
         assert!(bsdf.sample(below(wo), 0.5, u, R).is_none());
         assert_eq!(bsdf.albedo(below(wo)), Rgb::BLACK);
-        let both = bsdf.two_sided();
-        assert_eq!(both.eval_pdf(wo, wi, R), bsdf.eval_pdf(wo, wi, R));
-        assert_eq!(
-            both.eval_pdf(below(wo), below(wi), R),
-            bsdf.eval_pdf(wo, wi, R)
-        );
-        assert_eq!(both.eval_pdf(below(wo), wi, R), (Rgb::BLACK, 0.0));
-        let (a, b) = (
-            bsdf.sample(wo, 0.5, u, R).unwrap(),
-            both.sample(below(wo), 0.5, u, R).unwrap(),
-        );
+        let both = Material::UniformBothSides(bsdf);
+        let seen_from = |wo: Vec3| both.shade(&seen_along(wo), 0.0);
+        let (front, back) = (seen_from(wo), seen_from(below(wo)));
+        let (f, pdf) = bsdf.eval_pdf(wo, wi, R);
+        assert_eq!(front.eval_pdf(wi, R), (f * wi.z, pdf));
+        assert_eq!(back.eval_pdf(below(wi), R), (f * wi.z, pdf));
+        assert_eq!(back.eval_pdf(wi, R), (Rgb::BLACK, 0.0));
+        let a = bsdf.sample(wo, 0.5, u, R).unwrap();
+        let b = back.sample(0.5, u, R).unwrap();
         assert_eq!(
             (below(a.wi), a.weight, a.density),
             (b.wi, b.weight, b.density)
         );
-        assert_eq!(both.albedo(below(wo)), bsdf.albedo(wo));
+        assert_eq!(back.albedo(), bsdf.albedo(wo));
+    }
+}
+
+/// A hit on the plane z = 0, seen from `wo`.
+fn seen_along(wo: Vec3) -> Hit {
+    Hit {
+        p: Vec3::ZERO,
+        p_err: Vec3::ZERO,
+        ng: Vec3::Z,
+        frame: Frame {
+            s: Vec3::X,
+            t: Vec3::Y,
+            n: Vec3::Z,
+        },
+        uv: Vec2::ZERO,
+        wo,
+        time: 0.0,
+        shape: ShapeId(0),
+        prim: 0,
+        bary: Vec2::ZERO,
     }
 }
 

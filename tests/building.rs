@@ -105,7 +105,7 @@ fn pictures_never_reflect_more_than_all_or_less_than_nothing() {
         );
         let built = build(&dir, &body);
         let albedo_at = |(x, y)| {
-            let bsdf = built.job.scene.bsdf(&seen_at(&built, x, y));
+            let bsdf = built.job.scene.shade(&seen_at(&built, x, y), 0.0).bsdf;
             PI * bsdf.eval(Vec3::Z, Vec3::Z, Mode::Radiance).r
         };
         let albedos = [(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5)].map(albedo_at);

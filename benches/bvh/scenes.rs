@@ -191,6 +191,7 @@ pub fn rays(mesh: &Mesh, accel: &Accel) -> Vec<(&'static str, Vec<Ray>)> {
                 o: p,
                 d: to / len,
                 t_max: len,
+                time: 0.0,
             }
         })
         .collect();

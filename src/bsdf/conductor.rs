@@ -2,7 +2,7 @@
 
 use super::dielectric::{delta, mirror};
 use super::microfacet::Microfacet;
-use super::{BsdfSample, Density, Sides, fresnel};
+use super::{BsdfSample, Density, fresnel};
 use crate::math::{Rgb, Vec2, Vec3};
 
 /// A polished metal: a mirror with the reflectance of a conductor.
@@ -13,7 +13,6 @@ pub struct Conductor {
     pub k: Rgb,
     /// Factor on the reflectance, 1 for real matter.
     pub reflectance: Rgb,
-    pub sides: Sides,
 }
 
 impl Conductor {
@@ -23,17 +22,15 @@ impl Conductor {
             eta,
             k,
             reflectance: Rgb::WHITE,
-            sides: Sides::Front,
         }
     }
 
     #[inline]
     pub(super) fn sample(&self, wo: Vec3) -> Option<BsdfSample> {
-        let cos = self.sides.front(wo.z, wo.z);
-        if cos <= 0.0 {
+        if wo.z <= 0.0 {
             return None;
         }
-        delta(mirror(wo), self.fresnel(cos), 1.0)
+        delta(mirror(wo), self.fresnel(wo.z), 1.0)
     }
 
     #[inline]
@@ -51,10 +48,8 @@ pub struct RoughConductor {
     pub metal: Conductor,
 }
 
-/// Both directions seen from the front, and the facet normal that reflects one into the other.
+/// The facet normal that reflects two directions into each other.
 struct HalfVector {
-    wo: Vec3,
-    wi: Vec3,
     m: Vec3,
     /// D(m), > 0.
     d: f32,
@@ -68,8 +63,8 @@ impl RoughConductor {
         let Some(half) = self.half_vector(wo, wi) else {
             return (Rgb::BLACK, 0.0);
         };
-        let masking = self.facets.g1_over_cos(half.wo);
-        let f = 0.25 * half.d * (masking * self.facets.g1_over_cos(half.wi));
+        let masking = self.facets.g1_over_cos(wo);
+        let f = 0.25 * half.d * (masking * self.facets.g1_over_cos(wi));
         let pdf = self.reflected_pdf(half.d, masking, half.m.z, half.cos);
         (self.metal.fresnel(half.cos) * f, pdf)
     }
@@ -77,7 +72,7 @@ impl RoughConductor {
     #[inline]
     pub(super) fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
         self.half_vector(wo, wi).map_or(0.0, |half| {
-            let masking = self.facets.g1_over_cos(half.wo);
+            let masking = self.facets.g1_over_cos(wo);
             self.reflected_pdf(half.d, masking, half.m.z, half.cos)
         })
     }
@@ -95,9 +90,6 @@ impl RoughConductor {
 
     #[inline]
     fn half_vector(&self, wo: Vec3, wi: Vec3) -> Option<HalfVector> {
-        let sides = self.metal.sides;
-        let wi = sides.front_vec(wo, wi);
-        let wo = sides.front_vec(wo, wo);
         if wo.z <= 0.0 || wi.z <= 0.0 {
             return None;
         }
@@ -108,8 +100,6 @@ impl RoughConductor {
         // Half the sum of two unit vectors has the length of the cosine: the same from both ends, so that
         // the value is reciprocal to the last digits also where both graze the surface.
         (length > 0.0 && d > 0.0).then_some(HalfVector {
-            wo,
-            wi,
             m,
             d,
             cos: (0.5 * length).min(1.0),
@@ -118,13 +108,12 @@ impl RoughConductor {
 
     #[inline]
     pub(super) fn sample(&self, wo: Vec3, u: Vec2) -> Option<BsdfSample> {
-        let front = self.metal.sides.front_vec(wo, wo);
-        if front.z <= 0.0 {
+        if wo.z <= 0.0 {
             return None;
         }
-        let m = self.facets.sample(front, u);
-        let cos = front.dot(m);
-        let wi = 2.0 * cos * m - front;
+        let m = self.facets.sample(wo, u);
+        let cos = wo.dot(m);
+        let wi = 2.0 * cos * m - wo;
         if cos <= 0.0 || wi.z <= 0.0 {
             return None;
         }
@@ -132,7 +121,7 @@ impl RoughConductor {
         // of two f32 directions has lost the shape of the lobe.
         let d = self.facets.d(m);
         let shadowing = self.facets.g1_over_cos(wi) * wi.z;
-        let masking = self.facets.g1_over_cos(front);
+        let masking = self.facets.g1_over_cos(wo);
         let pdf = self.reflected_pdf(d, masking, m.z, cos);
         let weight = if self.facets.visible {
             shadowing
@@ -142,7 +131,7 @@ impl RoughConductor {
         let weight = self.metal.fresnel(cos) * weight;
         let usable = pdf > 0.0 && pdf.is_finite() && !weight.is_black();
         usable.then_some(BsdfSample {
-            wi: self.metal.sides.front_vec(wo, wi),
+            wi,
             weight,
             density: Density::PerSr(pdf),
             eta: 1.0,

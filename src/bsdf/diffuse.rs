@@ -1,6 +1,6 @@
 //! Lambert's reflector.
 
-use super::{BsdfSample, Density, Sides};
+use super::{BsdfSample, Density};
 use crate::math::warp::{cosine_hemisphere, cosine_hemisphere_pdf};
 use crate::math::{Rgb, Vec2, Vec3};
 use std::f32::consts::FRAC_1_PI;
@@ -9,24 +9,18 @@ use std::f32::consts::FRAC_1_PI;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Diffuse {
     pub albedo: Rgb,
-    pub sides: Sides,
 }
 
 impl Diffuse {
     #[inline]
     pub fn new(albedo: Rgb) -> Diffuse {
-        Diffuse {
-            albedo,
-            sides: Sides::Front,
-        }
+        Diffuse { albedo }
     }
 
     #[inline]
     pub(super) fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
-        let cos_o = self.sides.front(wo.z, wo.z);
-        let cos_i = self.sides.front(wo.z, wi.z);
-        if cos_o > 0.0 && cos_i > 0.0 {
-            (self.albedo * FRAC_1_PI, cosine_hemisphere_pdf(cos_i))
+        if wo.z > 0.0 && wi.z > 0.0 {
+            (self.albedo * FRAC_1_PI, cosine_hemisphere_pdf(wi.z))
         } else {
             (Rgb::BLACK, 0.0)
         }
@@ -34,16 +28,14 @@ impl Diffuse {
 
     #[inline]
     pub(super) fn sample(&self, wo: Vec3, u: Vec2) -> Option<BsdfSample> {
-        if self.sides.front(wo.z, wo.z) <= 0.0 || self.albedo.is_black() {
+        if wo.z <= 0.0 || self.albedo.is_black() {
             return None;
         }
-        let mut wi = cosine_hemisphere(u);
-        let pdf = cosine_hemisphere_pdf(wi.z);
-        wi.z = self.sides.front(wo.z, wi.z);
+        let wi = cosine_hemisphere(u);
         Some(BsdfSample {
             wi,
             weight: self.albedo,
-            density: Density::PerSr(pdf),
+            density: Density::PerSr(cosine_hemisphere_pdf(wi.z)),
             eta: 1.0,
         })
     }

@@ -63,32 +63,6 @@ pub enum Mode {
     Importance,
 }
 
-/// Which sides of a surface reflect alike.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sides {
-    /// The side of the normal; the other is black.
-    Front,
-    /// Both, each as if it were the front.
-    Both,
-}
-
-impl Sides {
-    /// The z of a direction as seen from the front, when the z of `wo` is `wo_z`.
-    #[inline]
-    fn front(self, wo_z: f32, z: f32) -> f32 {
-        if self == Sides::Both && wo_z < 0.0 {
-            -z
-        } else {
-            z
-        }
-    }
-
-    #[inline]
-    fn front_vec(self, wo: Vec3, w: Vec3) -> Vec3 {
-        Vec3::new(w.x, w.y, self.front(wo.z, w.z))
-    }
-}
-
 /// How a point of a surface scatters light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bsdf {
@@ -103,17 +77,6 @@ pub enum Bsdf {
 const _: () = assert!(size_of::<Bsdf>() <= 64);
 
 impl Bsdf {
-    /// The same reflection on both sides. What transmits light has two sides of its own and stays as it is.
-    pub fn two_sided(mut self) -> Bsdf {
-        match &mut self {
-            Bsdf::Diffuse(b) => b.sides = Sides::Both,
-            Bsdf::Conductor(b) => b.sides = Sides::Both,
-            Bsdf::RoughConductor(b) => b.metal.sides = Sides::Both,
-            Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Null(_) => {}
-        }
-        self
-    }
-
     /// f(wo, wi) in 1/sr, without cosine. Delta lobes contribute nothing.
     #[inline]
     pub fn eval(&self, wo: Vec3, wi: Vec3, mode: Mode) -> Rgb {
@@ -188,12 +151,12 @@ impl Bsdf {
     /// Share of the light from `wo` that is scattered on, for the albedo layer (denoisers): exact for
     /// smooth surfaces, for rough metals the Fresnel reflectance without masking.
     pub fn albedo(&self, wo: Vec3) -> Rgb {
-        let metal = |b: &Conductor| match b.sides.front(wo.z, wo.z) {
-            cos if cos > 0.0 => b.fresnel(cos),
-            _ => Rgb::BLACK,
+        let metal = |b: &Conductor| match wo.z > 0.0 {
+            true => b.fresnel(wo.z),
+            false => Rgb::BLACK,
         };
         match self {
-            Bsdf::Diffuse(b) if b.sides.front(wo.z, wo.z) > 0.0 => b.albedo,
+            Bsdf::Diffuse(b) if wo.z > 0.0 => b.albedo,
             Bsdf::Diffuse(_) => Rgb::BLACK,
             Bsdf::Conductor(b) => metal(b),
             Bsdf::RoughConductor(b) => metal(&b.metal),

@@ -306,8 +306,10 @@ impl Mesh {
             frame,
             uv: self.uv(raw.prim, raw.uv),
             wo: -ray.d,
+            time: ray.time,
             shape: raw.shape,
             prim: raw.prim,
+            bary: raw.uv,
         }
     }
 

@@ -20,14 +20,18 @@ pub struct Ray {
     pub o: Vec3,
     pub d: Vec3,
     pub t_max: f32,
+    /// When the light travels, 0 to 1 over the shutter.
+    pub time: f32,
 }
 
 impl Ray {
+    /// An endless ray at time 0.
     pub fn new(o: Vec3, d: Vec3) -> Ray {
         Ray {
             o,
             d,
             t_max: f32::INFINITY,
+            time: 0.0,
         }
     }
 
@@ -67,15 +71,22 @@ pub struct Hit {
     pub uv: Vec2,
     /// Unit direction towards where the ray came from.
     pub wo: Vec3,
+    /// When the surface was met, 0 to 1 over the shutter.
+    pub time: f32,
     pub shape: ShapeId,
     pub prim: u32,
+    /// Barycentric weights of the second and third corner of a triangle.
+    pub bary: Vec2,
 }
 
 impl Hit {
     /// A ray that leaves the surface along the unit vector `wi`.
     #[inline]
     pub fn spawn(&self, wi: Vec3) -> Ray {
-        Ray::new(fp::offset_origin(self.p, self.p_err, self.ng, wi), wi)
+        Ray {
+            time: self.time,
+            ..Ray::new(fp::offset_origin(self.p, self.p_err, self.ng, wi), wi)
+        }
     }
 
     /// The segment from here to `q`, free of both surfaces it connects.
@@ -89,6 +100,7 @@ impl Hit {
             o,
             d: d / len,
             t_max: fp::connection_t_max(len),
+            time: self.time,
         }
     }
 }
@@ -199,8 +211,10 @@ impl Geometry {
             frame: Frame::from_tangent(point.n, point.dp_du.as_vec3()),
             uv: point.uv,
             wo: -ray.d,
+            time: ray.time,
             shape: raw.shape,
             prim: raw.prim,
+            bary: raw.uv,
         }
     }
 

@@ -152,7 +152,8 @@ impl Job {
                     let ray = self
                         .camera
                         .ray(Vec2::new(px as f32 + 0.5, py as f32 + 0.5) + offset);
-                    let radiance = self.integrator.li(&self.scene, ray, &sampler, &mut rays);
+                    let li = self.integrator.li(&self.scene, ray, &sampler, &mut rays);
+                    let radiance = li.radiance;
                     // A NaN fails the comparison too.
                     if radiance.is_finite() && radiance.min_component() >= 0.0 {
                         tile.add(x, y, s, radiance * weight);
@@ -162,7 +163,8 @@ impl Job {
                     }
                     if !aovs.is_empty() {
                         aov_values.clear();
-                        aov::evaluate(&self.scene, &ray, radiance, &aovs, &mut aov_values);
+                        let [.., u] = sampler.get4(dim::VERTEX + dim::CHOICES);
+                        aov::evaluate(&self.scene, &ray, &li, u, &aovs, &mut aov_values);
                         aov_values.iter_mut().for_each(|v| *v *= weight);
                         tile.add_aov(x, y, &aov_values);
                     }

@@ -90,6 +90,7 @@ impl Camera {
             o: self.origin + d * near,
             d,
             t_max: self.far * length - near,
+            time: 0.0,
         }
     }
 }

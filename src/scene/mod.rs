@@ -6,10 +6,9 @@ mod plan;
 pub use camera::{Camera, FovAxis, PerspectiveSpec};
 pub use plan::{Plan, PlanEntry};
 
-use crate::bsdf::Bsdf;
 use crate::geom::{Accel, Geometry, Hit, Hooks, MeshRef, Ray, ShapeId};
 use crate::light::{Emitter, EmitterSample, Lights};
-use crate::material::Material;
+use crate::material::{Material, Shading};
 use crate::math::{DVec3, Rgb, Vec2, Vec3};
 
 /// Index of a material of the scene.
@@ -43,6 +42,8 @@ pub struct Scene {
     has_analytic: bool,
     /// Whether shading frames must follow dp/du.
     tangents: bool,
+    /// Whether chance decides what some material is.
+    mixed: bool,
     center: DVec3,
     plan: Plan,
 }
@@ -108,6 +109,7 @@ impl Scene {
             ),
             false => plan.add("tangents", "none", "no material is anisotropic"),
         }
+        let mixed = materials.iter().any(Material::is_mixed);
         let lights = Lights::new(emitters, &geometries);
         plan_of_scene(&mut plan, &lights, has_analytic, emitters_can_be_met);
         Scene {
@@ -119,6 +121,7 @@ impl Scene {
             accel,
             has_analytic,
             tangents,
+            mixed,
             center,
             plan,
         }
@@ -145,10 +148,23 @@ impl Scene {
         }
     }
 
-    /// How the surface scatters at `hit`, seen from `hit.wo`.
+    /// How the surface scatters at `hit`, seen from `hit.wo`; `u` in [0,1) decides where chance does.
     #[inline]
-    pub fn bsdf(&self, hit: &Hit) -> Bsdf {
-        self.materials[self.surfaces[hit.shape.0 as usize].0 as usize].bsdf(hit)
+    pub fn shade(&self, hit: &Hit, u: f32) -> Shading {
+        self.materials[self.surfaces[hit.shape.0 as usize].0 as usize].shade(hit, u)
+    }
+
+    /// Whether [`Scene::shade`] uses `u` for some material.
+    #[inline]
+    pub fn materials_are_mixed(&self) -> bool {
+        self.mixed
+    }
+
+    /// Share of light that passes along `ray` through masks and boundaries that are not there, at most
+    /// `passes` of them; 0 where anything else stands in the way.
+    #[inline]
+    pub fn transmittance(&self, ray: &Ray, _passes: u32) -> f32 {
+        if self.occluded(ray) { 0.0 } else { 1.0 }
     }
 
     /// Radiance emitted at `hit` towards `hit.wo`.

@@ -1,8 +1,9 @@
 //! Arbitrary output variables: what the camera sees first, without light.
 
 use crate::geom::Ray;
-use crate::math::{DVec3, Rgb};
+use crate::math::DVec3;
 use crate::scene::Scene;
+use crate::transport::Li;
 
 /// A quantity of the first surface seen. Where nothing is seen it is zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,7 +23,7 @@ pub enum Aov {
     ShapeIndex,
     /// Number of the triangle within its mesh.
     PrimIndex,
-    /// 1 where the ray meets something that is seen, 0 where it meets nothing.
+    /// Share of samples that see a surface or an environment that shines.
     Alpha,
     /// Square of the sample's radiance: with the mean, the variance of a single sample.
     SecondMoment,
@@ -41,10 +42,11 @@ impl Aov {
     }
 }
 
-/// Appends the channels of `aovs`, in order, for the surface that `ray` meets; `radiance` is the value of
-/// the sample that the ray belongs to.
-pub fn evaluate(scene: &Scene, ray: &Ray, radiance: Rgb, aovs: &[Aov], out: &mut Vec<f32>) {
-    let needs_surface = aovs.iter().any(|a| *a != Aov::SecondMoment);
+/// Appends the channels of `aovs`, in order, for the surface that `ray` meets; `li` is the sample that the
+/// ray belongs to, `u` in [0,1) decides what a mixed material is.
+pub fn evaluate(scene: &Scene, ray: &Ray, li: &Li, u: f32, aovs: &[Aov], out: &mut Vec<f32>) {
+    let without_surface = |a: &Aov| matches!(a, Aov::SecondMoment | Aov::Alpha);
+    let needs_surface = !aovs.iter().all(without_surface);
     let hit = if needs_surface {
         scene.intersect(ray)
     } else {
@@ -53,15 +55,10 @@ pub fn evaluate(scene: &Scene, ray: &Ray, radiance: Rgb, aovs: &[Aov], out: &mut
     for aov in aovs {
         let start = out.len();
         match (aov, &hit) {
-            (Aov::SecondMoment, _) => out.extend(radiance.map(|v| v * v).to_array()),
-            (Aov::Alpha, _) => {
-                let seen = hit.is_some() || !scene.le_escaped(ray.d).is_black();
-                out.push(f32::from(seen));
-            }
+            (Aov::SecondMoment, _) => out.extend(li.radiance.map(|v| v * v).to_array()),
+            (Aov::Alpha, _) => out.push(f32::from(li.seen)),
             (_, None) => out.resize(start + aov.channels().len(), 0.0),
-            (Aov::Albedo, Some(h)) => {
-                out.extend(scene.bsdf(h).albedo(h.frame.to_local(h.wo)).to_array())
-            }
+            (Aov::Albedo, Some(h)) => out.extend(scene.shade(h, u).albedo().to_array()),
             (Aov::ShadingNormal, Some(h)) => out.extend(h.frame.n.to_array()),
             (Aov::GeometricNormal, Some(h)) => out.extend(h.ng.to_array()),
             (Aov::Position, Some(h)) => {

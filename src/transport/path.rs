@@ -1,12 +1,12 @@
 //! The camera walk: unidirectional path tracing with next-event estimation.
 
-use crate::bsdf::{Density, Mode};
+use crate::bsdf::{Bsdf, Density, Mode};
 use crate::geom::{Hit, Ray};
 use crate::math::Rgb;
 use crate::sampler::Sampler;
 use crate::scene::Scene;
 
-use super::{Mis, PathStats, VertexNumbers, direct_light};
+use super::{Connect, Li, Mis, PathStats, VertexNumbers, direct_light};
 
 /// Longest path, in path vertices after the camera, when none is asked for: longer ones are cut. Only a
 /// closed scene of albedo 1 without Russian roulette gets here.
@@ -98,9 +98,10 @@ fn first_seen(
 
 impl PathSpec {
     /// One sample of the radiance along `ray` (Kajiya 1986; MIS as Veach 1997, section 10.3.1).
-    pub fn li(&self, scene: &Scene, mut ray: Ray, sampler: &Sampler, stats: &mut PathStats) -> Rgb {
+    pub fn li(&self, scene: &Scene, mut ray: Ray, sampler: &Sampler, stats: &mut PathStats) -> Li {
         let max_depth = self.max_depth.unwrap_or(UNBOUNDED);
         let (mut lo, mut throughput) = (Rgb::BLACK, Rgb::WHITE);
+        let mut seen = false;
         // Product of the squared relative indices of refraction: takes the compression of radiance in a
         // dense medium out of the roulette's decision.
         let mut eta2 = 1.0;
@@ -116,7 +117,9 @@ impl PathSpec {
                 light_per_bsdf: 1.0,
             });
             if depth > 0 || !self.hide_emitters {
-                lo += throughput * emission(scene, &ray, met.as_ref(), departure);
+                let le = emission(scene, &ray, met.as_ref(), departure);
+                seen |= last.is_none() && !le.is_black();
+                lo += throughput * le;
             }
             let Some(hit) = met else {
                 break;
@@ -124,26 +127,39 @@ impl PathSpec {
             if depth + 1 >= max_depth {
                 break;
             }
-            let bsdf = scene.bsdf(&hit);
             let roulette = depth + 1 >= self.rr_depth;
-            let any_choice = roulette || scene.lights_are_chosen() || bsdf.has_lobes();
             let sampler = match depth < SPREAD_VERTICES {
                 true => *sampler,
                 false => sampler.independent(),
             };
-            let u = VertexNumbers::at(&sampler, depth, any_choice);
-            if !bsdf.is_delta() && scene.has_lights() {
-                let mis = Mis::Power {
-                    bsdf_per_light: 1.0,
+            let mut numbers = VertexNumbers::new(&sampler, depth);
+            let shading = scene.shade(&hit, numbers.material(scene));
+            if let Bsdf::Null(passed) = shading.bsdf {
+                // The surface is not there, but counts as an edge: what is chosen at the last vertex is
+                // still under way.
+                throughput *= passed.transmittance;
+                ray = hit.spawn(ray.d);
+                stats.indirect += 1;
+                continue;
+            }
+            seen = true;
+            let any_choice = roulette || scene.lights_are_chosen() || shading.bsdf.has_lobes();
+            let u = numbers.draw(any_choice);
+            if !shading.bsdf.is_delta() && scene.has_lights() {
+                let connect = Connect {
+                    mis: Mis::Power {
+                        bsdf_per_light: 1.0,
+                    },
+                    passes: max_depth - depth - 2,
                 };
-                lo += throughput * direct_light(scene, &hit, &bsdf, mis, u.pick, u.light, stats);
+                let lit = direct_light(scene, &hit, &shading, connect, u.pick, u.light, stats);
+                lo += throughput * lit;
             }
             // The last edge could only meet an emitter.
             if depth + 2 >= max_depth && !scene.emitters_can_be_met() {
                 break;
             }
-            let wo = hit.frame.to_local(hit.wo);
-            let Some(sample) = bsdf.sample(wo, u.lobe, u.direction, Mode::Radiance) else {
+            let Some(sample) = shading.sample(u.lobe, u.direction, Mode::Radiance) else {
                 break;
             };
             throughput *= sample.weight;
@@ -158,50 +174,53 @@ impl PathSpec {
             if throughput.is_black() {
                 break;
             }
-            ray = hit.spawn(hit.frame.to_world(sample.wi));
+            ray = hit.spawn(sample.wi);
             stats.indirect += 1;
             last = Some((hit, sample.density));
         }
-        lo
+        Li { radiance: lo, seen }
     }
 }
 
 impl DirectSpec {
     /// One sample of the emission seen and of the direct light reflected along `ray`.
-    pub fn li(&self, scene: &Scene, ray: Ray, sampler: &Sampler, stats: &mut PathStats) -> Rgb {
+    pub fn li(&self, scene: &Scene, ray: Ray, sampler: &Sampler, stats: &mut PathStats) -> Li {
         let met = first_seen(scene, ray, self.hide_emitters, stats);
         let mut lo = Rgb::BLACK;
         if !self.hide_emitters {
             lo += emission(scene, &ray, met.as_ref(), None);
         }
         let Some(hit) = met else {
-            return lo;
+            let seen = !lo.is_black();
+            return Li { radiance: lo, seen };
         };
-        let bsdf = scene.bsdf(&hit);
+        let shading = scene.shade(&hit, VertexNumbers::new(sampler, 0).material(scene));
+        let passed = matches!(shading.bsdf, Bsdf::Null(_));
+        let seen = !passed || !lo.is_black();
         let (n_light, n_bsdf) = (self.emitter_samples as f32, self.bsdf_samples as f32);
-        if !bsdf.is_delta() && scene.has_lights() {
+        if !shading.bsdf.is_delta() && scene.has_lights() {
             let mis = match self.bsdf_samples {
                 0 => Mis::LightOnly,
                 _ => Mis::Power {
                     bsdf_per_light: n_bsdf / n_light,
                 },
             };
+            let connect = Connect { mis, passes: 0 };
             for i in 0..self.emitter_samples {
-                let u = VertexNumbers::at(sampler, i, scene.lights_are_chosen());
-                let lit = direct_light(scene, &hit, &bsdf, mis, u.pick, u.light, stats);
+                let u = VertexNumbers::new(sampler, i).draw(scene.lights_are_chosen());
+                let lit = direct_light(scene, &hit, &shading, connect, u.pick, u.light, stats);
                 lo += lit * (1.0 / n_light);
             }
         }
         if !scene.emitters_can_be_met() {
-            return lo;
+            return Li { radiance: lo, seen };
         }
-        let wo = hit.frame.to_local(hit.wo);
         for i in 0..self.bsdf_samples {
-            let u = VertexNumbers::at(sampler, i, bsdf.has_lobes());
-            let Some(sample) = bsdf.sample(wo, u.lobe, u.direction, Mode::Radiance) else {
+            let u = VertexNumbers::new(sampler, i).draw(shading.bsdf.has_lobes());
+            let Some(sample) = shading.sample(u.lobe, u.direction, Mode::Radiance) else {
                 continue;
             };
-            let ray = hit.spawn(hit.frame.to_world(sample.wi));
+            let ray = hit.spawn(sample.wi);
             stats.indirect += 1;
             let departure = Departure {
                 from: &hit,
@@ -213,6 +232,6 @@ impl DirectSpec {
                 * emission(scene, &ray, met.as_ref(), Some(departure))
                 * (1.0 / n_bsdf);
         }
-        lo
+        Li { radiance: lo, seen }
     }
 }

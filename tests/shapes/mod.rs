@@ -83,7 +83,9 @@ pub fn receiver(p: Vec3, n: Vec3) -> Hit {
         frame: Frame::from_normal(n),
         uv: Vec2::ZERO,
         wo: n,
+        time: 0.0,
         shape: ShapeId(u32::MAX),
         prim: 0,
+        bary: Vec2::ZERO,
     }
 }

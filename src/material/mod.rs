@@ -1,15 +1,21 @@
 //! Materials: from a hit, by way of textures, to the numbers of a [`Bsdf`].
 
+mod shading;
+
+pub use shading::Shading;
+
 use crate::bsdf::{Bsdf, Conductor, Dielectric, Diffuse, Microfacet, RoughConductor, Shape};
 use crate::geom::Hit;
-use crate::math::Vec2;
-use crate::texture::Texture;
+use crate::math::Frame;
+use crate::texture::{At, Texture};
 
 /// How a surface scatters light, as a function of the place on it.
 #[derive(Clone, Debug)]
 pub enum Material {
     /// The same everywhere: nothing to look up.
     Uniform(Bsdf),
+    /// The same everywhere and on both sides, each as if it were the front.
+    UniformBothSides(Bsdf),
     Diffuse {
         reflectance: Texture,
     },
@@ -51,49 +57,71 @@ pub struct Roughness {
 }
 
 impl Material {
-    /// What the material is at `hit`.
+    /// What the material is at `hit`. `u` in [0,1) decides where it is a mixture (see
+    /// [`Material::is_mixed`]).
     #[inline]
-    pub fn bsdf(&self, hit: &Hit) -> Bsdf {
+    pub fn shade(&self, hit: &Hit, u: f32) -> Shading {
         match self {
-            Material::Uniform(bsdf) => *bsdf,
+            Material::Uniform(bsdf) => Shading::new(hit, hit.frame, *bsdf),
+            Material::UniformBothSides(bsdf) => Shading::new(hit, facing(hit), *bsdf),
+            _ => self.shade_in(hit, hit.frame, u),
+        }
+    }
+
+    /// The same in a frame that may be turned to the back of the surface.
+    fn shade_in(&self, hit: &Hit, frame: Frame, u: f32) -> Shading {
+        match self {
+            Material::UniformBothSides(bsdf) => Shading::new(hit, facing(hit), *bsdf),
             Material::TwoSided { front, back } => {
                 let side = if hit.wo.dot(hit.frame.n) < 0.0 {
                     back
                 } else {
                     front
                 };
-                side.one_sided(hit.uv).two_sided()
+                side.shade_in(hit, facing(hit), u)
             }
-            one_sided => one_sided.one_sided(hit.uv),
+            plain => Shading::new(hit, frame, plain.bsdf(&at(hit))),
         }
     }
 
-    fn one_sided(&self, uv: Vec2) -> Bsdf {
+    /// The numbers of a material without structure of its own.
+    fn bsdf(&self, at: &At) -> Bsdf {
         match self {
-            Material::Uniform(bsdf) => *bsdf,
-            Material::Diffuse { reflectance } => Bsdf::Diffuse(Diffuse::new(reflectance.eval(uv))),
-            Material::Conductor(metal) => Bsdf::Conductor(metal.at(uv)),
+            Material::Uniform(bsdf) | Material::UniformBothSides(bsdf) => *bsdf,
+            Material::Diffuse { reflectance } => Bsdf::Diffuse(Diffuse::new(reflectance.eval(at))),
+            Material::Conductor(metal) => Bsdf::Conductor(metal.at(at)),
             Material::RoughConductor { metal, roughness } => Bsdf::RoughConductor(RoughConductor {
-                facets: roughness.at(uv),
-                metal: metal.at(uv),
+                facets: roughness.at(at),
+                metal: metal.at(at),
             }),
             Material::Dielectric {
                 eta,
                 reflectance,
                 transmittance,
             } => Bsdf::Dielectric(Dielectric {
-                reflectance: reflectance.eval(uv),
-                transmittance: transmittance.eval(uv),
+                reflectance: reflectance.eval(at),
+                transmittance: transmittance.eval(at),
                 ..Dielectric::new(*eta)
             }),
-            Material::TwoSided { front, .. } => front.one_sided(uv),
+            Material::TwoSided { front, .. } => front.bsdf(at),
+        }
+    }
+
+    /// Whether chance decides what the material is at a hit.
+    pub fn is_mixed(&self) -> bool {
+        match self {
+            Material::TwoSided { front, back } => front.is_mixed() || back.is_mixed(),
+            _ => false,
         }
     }
 
     /// Whether the material scatters differently along the two tangents: roughness given for each.
     pub fn is_anisotropic(&self) -> bool {
         match self {
-            Material::Uniform(Bsdf::RoughConductor(b)) => b.facets.alpha.x != b.facets.alpha.y,
+            Material::Uniform(Bsdf::RoughConductor(b))
+            | Material::UniformBothSides(Bsdf::RoughConductor(b)) => {
+                b.facets.alpha.x != b.facets.alpha.y
+            }
             Material::RoughConductor { roughness, .. } => roughness.anisotropic,
             Material::TwoSided { front, back } => front.is_anisotropic() || back.is_anisotropic(),
             _ => false,
@@ -102,11 +130,14 @@ impl Material {
 
     /// The same material in its cheapest form: uniform where no texture varies and both sides agree.
     pub fn folded(self) -> Material {
+        if let Material::UniformBothSides(_) = self {
+            return self;
+        }
         if let Material::TwoSided { front, back } = self {
             let (front, back) = (front.folded(), back.folded());
             return match (&front, &back) {
                 (Material::Uniform(f), Material::Uniform(b)) if f == b => {
-                    Material::Uniform(f.two_sided())
+                    Material::UniformBothSides(*f)
                 }
                 _ => Material::TwoSided {
                     front: Box::new(front),
@@ -115,7 +146,7 @@ impl Material {
             };
         }
         match self.textures().iter().all(|t| t.as_constant().is_some()) {
-            true => Material::Uniform(self.one_sided(Vec2::ZERO)),
+            true => Material::Uniform(self.bsdf(&At::default())),
             false => self,
         }
     }
@@ -123,7 +154,9 @@ impl Material {
     /// The textures of a one-sided material.
     fn textures(&self) -> Vec<&Texture> {
         match self {
-            Material::Uniform(_) | Material::TwoSided { .. } => vec![],
+            Material::Uniform(_) | Material::UniformBothSides(_) | Material::TwoSided { .. } => {
+                vec![]
+            }
             Material::Diffuse { reflectance } => vec![reflectance],
             Material::Conductor(m) => vec![&m.eta, &m.k, &m.reflectance],
             Material::RoughConductor {
@@ -141,18 +174,38 @@ impl Material {
     }
 }
 
+/// The place of a hit, as textures see it.
+fn at(hit: &Hit) -> At {
+    At {
+        uv: hit.uv,
+        prim: hit.prim,
+        bary: hit.bary,
+    }
+}
+
+/// The frame of the hit, its normal turned to the side that is seen. The tangents stay, so that the back
+/// is the mirror image of the front.
+#[inline]
+fn facing(hit: &Hit) -> Frame {
+    let mut frame = hit.frame;
+    if hit.wo.dot(frame.n) < 0.0 {
+        frame.n = -frame.n;
+    }
+    frame
+}
+
 impl Metal {
-    fn at(&self, uv: Vec2) -> Conductor {
+    fn at(&self, at: &At) -> Conductor {
         Conductor {
-            reflectance: self.reflectance.eval(uv),
-            ..Conductor::new(self.eta.eval(uv), self.k.eval(uv))
+            reflectance: self.reflectance.eval(at),
+            ..Conductor::new(self.eta.eval(at), self.k.eval(at))
         }
     }
 }
 
 impl Roughness {
-    fn at(&self, uv: Vec2) -> Microfacet {
-        let alpha = |t: &Texture| t.eval_scalar(uv);
+    fn at(&self, at: &At) -> Microfacet {
+        let alpha = |t: &Texture| t.eval_scalar(at);
         Microfacet {
             visible: self.visible,
             ..Microfacet::new(self.shape, alpha(&self.alpha_u), alpha(&self.alpha_v))

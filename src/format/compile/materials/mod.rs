@@ -4,18 +4,17 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use glam::Affine2;
-
 use crate::bsdf::{Bsdf, Diffuse, Shape, metals};
 use crate::format::plugins::Category;
-use crate::format::{FloatOrTexture, ObjectId, Props, RgbOrTexture, SceneDesc, SceneError};
-use crate::image_io::{self, Encoding, Pixels};
+use crate::format::{ObjectId, Props, SceneDesc, SceneError};
 use crate::material::{Material, Metal, Roughness};
-use crate::math::{DVec3, Rgb, Transform, Vec2};
+use crate::math::Rgb;
 use crate::scene::{MaterialId, Plan};
-use crate::texture::{Bitmap, Checkerboard, Interpolation, Picture, Texels, Texture, Wrap};
+use crate::texture::{Picture, Texture};
 
 use super::suggest;
+
+mod textures;
 
 pub struct Materials<'a> {
     desc: &'a SceneDesc,
@@ -177,168 +176,7 @@ impl<'a> Materials<'a> {
             reflectance: self.reflectance(p, "specular_reflectance")?,
         })
     }
-
-    /// A reflectance or transmittance: what a picture has above 1 would make light out of nothing, on and
-    /// on where it is enclosed.
-    fn reflectance(&mut self, p: &Props<'a>, name: &str) -> Result<Texture, SceneError> {
-        let value = p.rgb_or_texture(name)?;
-        Ok(match self.resolve(value)? {
-            Texture::Constant(c) => Texture::Constant(c.map(|v| v.min(1.0))),
-            Texture::Bitmap(mut bitmap) => {
-                if let Texels::Floats(data) = &bitmap.texels.texels
-                    && data.iter().flatten().any(|v| *v > 1.0)
-                {
-                    let at = p.error_at(name, "values above 1 are cut to 1").at;
-                    self.warnings.push(format!(
-                        "{}:{}:{}: the picture has values above 1, which as \"{name}\" are cut to 1",
-                        at.file.display(),
-                        at.line,
-                        at.column
-                    ));
-                    let cut = data.iter().map(|t| t.map(|v| v.min(1.0))).collect();
-                    bitmap.texels = Arc::new(Picture {
-                        texels: Texels::Floats(cut),
-                        ..*bitmap.texels
-                    });
-                }
-                Texture::Bitmap(bitmap)
-            }
-            other => other,
-        })
-    }
-
-    fn scalar(&mut self, p: &Props<'a>, name: &str) -> Result<Texture, SceneError> {
-        match p.float_or_texture(name)? {
-            FloatOrTexture::Float(v) => Ok(Texture::Constant(Rgb::splat(v as f32))),
-            FloatOrTexture::Texture(id) => self.texture(id),
-        }
-    }
-
-    fn resolve(&mut self, value: RgbOrTexture) -> Result<Texture, SceneError> {
-        match value {
-            RgbOrTexture::Rgb(c) => Ok(Texture::Constant(c)),
-            RgbOrTexture::Texture(id) => self.texture(id),
-        }
-    }
-
-    pub fn texture(&mut self, id: ObjectId) -> Result<Texture, SceneError> {
-        if let Some(texture) = self.textures.get(&id) {
-            return Ok(texture.clone());
-        }
-        let p = self.desc.object(id);
-        let to_uv = affine2(&p.transform("to_uv")?);
-        let texture = match p.plugin() {
-            "checkerboard" => Texture::Checkerboard(Box::new(Checkerboard {
-                color0: self.reflectance(&p, "color0")?,
-                color1: self.reflectance(&p, "color1")?,
-                to_uv,
-            })),
-            _ => self.bitmap(&p, to_uv)?,
-        };
-        let texture = texture.folded();
-        self.textures.insert(id, texture.clone());
-        Ok(texture)
-    }
-
-    fn bitmap(&mut self, p: &Props<'a>, to_uv: Affine2) -> Result<Texture, SceneError> {
-        // The pixels keep the precision of the file.
-        p.ignore(&["format"]);
-        let key = (p.file("filename")?.to_path_buf(), p.bool("raw")?);
-        let texels = match self.pictures.get(&key) {
-            Some(picture) => Arc::clone(picture),
-            None => {
-                let read = image_io::Bitmap::read(&key.0);
-                let mut picture = read
-                    .map(|b| picture(b, key.1))
-                    .map_err(|e| p.error_at("filename", e.to_string()))?;
-                if let Texels::Floats(data) = &mut picture.texels {
-                    check_values(data, picture.width as usize)
-                        .map_err(|what| p.error_at("filename", what))?;
-                }
-                let picture = Arc::new(picture);
-                self.pictures.insert(key, Arc::clone(&picture));
-                picture
-            }
-        };
-        let interpolation = match p.choice("filter_type")? {
-            "nearest" => Interpolation::Nearest,
-            _ => Interpolation::Bilinear,
-        };
-        let wrap = match p.choice("wrap_mode")? {
-            "mirror" => Wrap::Mirror,
-            "clamp" => Wrap::Clamp,
-            _ => Wrap::Repeat,
-        };
-        Ok(Texture::Bitmap(Bitmap {
-            texels,
-            interpolation,
-            wrap,
-            to_uv,
-        }))
-    }
-
-    /// The pixels of an environment map, linear.
-    pub fn environment(&mut self, p: &Props) -> Result<Picture, SceneError> {
-        let read = image_io::Bitmap::read(p.file("filename")?);
-        read.map(|b| picture(b, false))
-            .map_err(|e| p.error_at("filename", e.to_string()))
-    }
 }
 
 /// Reflectance of a shape without a material, as in Mitsuba, unless it emits light: then it is black.
 const DEFAULT_REFLECTANCE: f32 = 0.5;
-
-/// The colours of a file, alpha left out, grey as three equal channels.
-fn picture(bitmap: image_io::Bitmap, raw: bool) -> Picture {
-    let n = bitmap.channels;
-    let colors = if n >= 3 { [0, 1, 2] } else { [0; 3] };
-    let srgb = bitmap.encoding == Encoding::Srgb && !raw;
-    let texels = match &bitmap.pixels {
-        Pixels::U8(v) => Texels::Bytes {
-            data: v.chunks_exact(n).map(|p| colors.map(|c| p[c])).collect(),
-            srgb,
-        },
-        Pixels::F32(v) => {
-            let decode = |v: f32| {
-                if srgb {
-                    image_io::color::srgb_to_linear(v)
-                } else {
-                    v
-                }
-            };
-            Texels::Floats(
-                v.chunks_exact(n)
-                    .map(|p| colors.map(|c| decode(p[c])))
-                    .collect(),
-            )
-        }
-    };
-    Picture {
-        width: bitmap.width as u32,
-        height: bitmap.height as u32,
-        texels,
-    }
-}
-
-/// Refuses what is no number, and makes zero of what lies below: pictures that were filtered with negative
-/// lobes have a little of it, and no texture means it.
-fn check_values(data: &mut [[f32; 3]], width: usize) -> Result<(), String> {
-    for (i, value) in data.iter_mut().enumerate() {
-        if !value.iter().all(|v| v.is_finite()) {
-            return Err(format!(
-                "pixel ({}, {}) is not a finite number",
-                i % width,
-                i / width
-            ));
-        }
-        *value = value.map(|v| v.max(0.0));
-    }
-    Ok(())
-}
-
-/// The part of a transform that acts on the first two coordinates.
-fn affine2(t: &Transform) -> Affine2 {
-    let (x, y, o) = (t.vector(DVec3::X), t.vector(DVec3::Y), t.point(DVec3::ZERO));
-    let flat = |v: DVec3| Vec2::new(v.x as f32, v.y as f32);
-    Affine2::from_cols(flat(x), flat(y), flat(o))
-}
