@@ -44,6 +44,14 @@ impl Texture {
         self.eval(at).luminance()
     }
 
+    /// Change of [`Texture::eval_scalar`] with u and v; 0 where the texture is constant or steps.
+    pub fn gradient(&self, uv: Vec2) -> Vec2 {
+        match self {
+            Texture::Bitmap(b) => b.gradient(uv),
+            Texture::Constant(_) | Texture::Checkerboard(_) => Vec2::ZERO,
+        }
+    }
+
     /// The same texture in its cheapest form: one that has a single colour becomes that colour.
     pub fn folded(self) -> Texture {
         let single = match &self {
@@ -164,6 +172,25 @@ impl Bitmap {
                 top.lerp(bottom, f.y)
             }
         }
+    }
+
+    /// The exact derivative of the bilinear surface of the luminance.
+    fn gradient(&self, uv: Vec2) -> Vec2 {
+        if self.interpolation == Interpolation::Nearest {
+            return Vec2::ZERO;
+        }
+        let size = Vec2::new(self.texels.width as f32, self.texels.height as f32);
+        let p = self.to_uv.transform_point2(uv) * size - 0.5;
+        let cell = p.floor();
+        let f = p - cell;
+        let (x, y) = (cell.x as i64, cell.y as i64);
+        let at = |dx: i64, dy: i64| self.at(x + dx, y + dy).luminance();
+        let [a, b, c, d] = [at(0, 0), at(1, 0), at(0, 1), at(1, 1)];
+        let slope = Vec2::new(
+            (b - a) * (1.0 - f.y) + (d - c) * f.y,
+            (c - a) * (1.0 - f.x) + (d - b) * f.x,
+        );
+        self.to_uv.matrix2.transpose() * (slope * size)
     }
 
     #[inline]

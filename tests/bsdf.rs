@@ -366,7 +366,7 @@ fn sides() {
         assert!(bsdf.sample(below(wo), 0.5, u, R).is_none());
         assert_eq!(bsdf.albedo(below(wo)), Rgb::BLACK);
         let both = Material::UniformBothSides(bsdf);
-        let seen_from = |wo: Vec3| both.shade(&seen_along(wo), 0.0);
+        let seen_from = |wo: Vec3| both.shade(&seen_along(wo), 0.0, || (Vec3::X, Vec3::Y));
         let (front, back) = (seen_from(wo), seen_from(below(wo)));
         let (f, pdf) = bsdf.eval_pdf(wo, wi, R);
         assert_eq!(front.eval_pdf(wi, R), (f * wi.z, pdf));

@@ -112,7 +112,10 @@ pub fn children(
             return Err(SceneError::new(place(object.at), what));
         }
     }
-    let given = |name: &str| object.params.iter().any(|p| p.name == name);
+    let given = |name: &str| {
+        let nested = |c: &Child| c.name.as_deref() == Some(name);
+        object.params.iter().any(|p| p.name == name) || object.children.iter().any(nested)
+    };
     match plugin
         .params
         .iter()

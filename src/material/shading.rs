@@ -1,5 +1,6 @@
 //! A material at a hit: a BSDF in the frame that it refers to.
 
+use super::relief;
 use crate::bsdf::{Bsdf, BsdfSample, Mode};
 use crate::geom::Hit;
 use crate::math::{Frame, Rgb, Vec2, Vec3};
@@ -13,8 +14,16 @@ pub struct Shading {
     frame: Frame,
     /// `hit.wo` in that frame.
     wo: Vec3,
-    /// Where a relief bends the frame: the normal of the smooth surface below.
-    smooth: Option<Vec3>,
+    /// What a relief bent the frame away from.
+    bend: Option<Bend>,
+}
+
+/// The smooth surface below a relief.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bend {
+    pub normal: Vec3,
+    /// Of the shadowing function (see `relief`).
+    pub alpha2: f32,
 }
 
 impl Shading {
@@ -24,17 +33,13 @@ impl Shading {
             bsdf,
             frame,
             wo: frame.to_local(hit.wo),
-            smooth: None,
+            bend: None,
         }
     }
 
-    /// The same with `frame` bent away from the surface whose normal is `smooth`.
     #[inline]
-    pub fn bent(hit: &Hit, frame: Frame, smooth: Vec3, bsdf: Bsdf) -> Shading {
-        Shading {
-            smooth: Some(smooth),
-            ..Shading::new(hit, frame, bsdf)
-        }
+    pub(super) fn bent(self, bend: Option<Bend>) -> Shading {
+        Shading { bend, ..self }
     }
 
     /// f |cos| towards `wi` in 1/sr, and the density per steradian with which [`Shading::sample`] returns
@@ -42,11 +47,11 @@ impl Shading {
     #[inline]
     pub fn eval_pdf(&self, wi: Vec3, mode: Mode) -> (Rgb, f32) {
         let local = self.frame.to_local(wi);
-        if self.is_torn(wi, local) {
+        let Some(shadowing) = self.shadowing(wi, local) else {
             return (Rgb::BLACK, 0.0);
-        }
+        };
         let (f, pdf) = self.bsdf.eval_pdf(self.wo, local, mode);
-        (f * local.z.abs(), pdf)
+        (f * (local.z.abs() * shadowing), pdf)
     }
 
     /// A direction in which light goes on; see [`Bsdf::sample`].
@@ -54,17 +59,24 @@ impl Shading {
     pub fn sample(&self, u_lobe: f32, u: Vec2, mode: Mode) -> Option<BsdfSample> {
         let sample = self.bsdf.sample(self.wo, u_lobe, u, mode)?;
         let wi = self.frame.to_world(sample.wi);
-        (!self.is_torn(wi, sample.wi)).then_some(BsdfSample { wi, ..sample })
+        let shadowing = self.shadowing(wi, sample.wi)?;
+        let weight = sample.weight * shadowing;
+        Some(BsdfSample {
+            wi,
+            weight,
+            ..sample
+        })
     }
 
-    /// Whether `wi` lies on different sides of the relief and of the surface that carries it: such light
-    /// would go through the surface, so it is left out.
+    /// Share of the light from `wi` that a relief leaves. `None` where `wi` lies on different sides of the
+    /// relief and of the surface that carries it: such light would go through the surface.
     #[inline]
-    fn is_torn(&self, wi: Vec3, local: Vec3) -> bool {
-        match self.smooth {
-            Some(n) => n.dot(wi) * local.z <= 0.0,
-            None => false,
-        }
+    fn shadowing(&self, wi: Vec3, local: Vec3) -> Option<f32> {
+        let Some(bend) = self.bend else {
+            return Some(1.0);
+        };
+        let cos = bend.normal.dot(wi);
+        (cos * local.z > 0.0).then(|| relief::shadowing(bend.alpha2, cos))
     }
 
     /// Share of the light from `wo` that is scattered on (see [`Bsdf::albedo`]).

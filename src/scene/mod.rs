@@ -8,7 +8,7 @@ pub use plan::{Plan, PlanEntry};
 
 use crate::geom::{Accel, Geometry, Hit, Hooks, MeshRef, Ray, ShapeId};
 use crate::light::{Emitter, EmitterSample, Lights};
-use crate::material::{Material, Shading};
+use crate::material::{self, Material, Shading};
 use crate::math::{DVec3, Rgb, Vec2, Vec3};
 
 /// Index of a material of the scene.
@@ -44,6 +44,8 @@ pub struct Scene {
     tangents: bool,
     /// Whether chance decides what some material is.
     mixed: bool,
+    /// Whether some material lets light through as if it were not there.
+    masked: bool,
     center: DVec3,
     plan: Plan,
 }
@@ -100,16 +102,22 @@ impl Scene {
         let accel = Accel::build(&meshes, &others);
         let has_analytic = !others.is_empty();
         let emitters_can_be_met = emitters.iter().any(|e| !matches!(e, Emitter::Point { .. }));
-        let tangents = materials.iter().any(Material::is_anisotropic);
+        let tangents = materials.iter().any(Material::follows_tangents);
         match tangents {
             true => plan.add(
                 "tangents",
                 "shading frames follow the texture coordinates",
-                "a material is anisotropic",
+                "a material is anisotropic or has a relief",
             ),
-            false => plan.add("tangents", "none", "no material is anisotropic"),
+            false => plan.add(
+                "tangents",
+                "none",
+                "no material is anisotropic or has a relief",
+            ),
         }
         let mixed = materials.iter().any(Material::is_mixed);
+        let masked = materials.iter().any(Material::lets_through);
+        plan_of_masks(&mut plan, masked);
         let lights = Lights::new(emitters, &geometries);
         plan_of_scene(&mut plan, &lights, has_analytic, emitters_can_be_met);
         Scene {
@@ -122,6 +130,7 @@ impl Scene {
             has_analytic,
             tangents,
             mixed,
+            masked,
             center,
             plan,
         }
@@ -151,7 +160,8 @@ impl Scene {
     /// How the surface scatters at `hit`, seen from `hit.wo`; `u` in [0,1) decides where chance does.
     #[inline]
     pub fn shade(&self, hit: &Hit, u: f32) -> Shading {
-        self.materials[self.surfaces[hit.shape.0 as usize].0 as usize].shade(hit, u)
+        let dp_duv = || self.geometries[hit.shape.0 as usize].dp_duv(hit);
+        self.material(hit).shade(hit, u, dp_duv)
     }
 
     /// Whether [`Scene::shade`] uses `u` for some material.
@@ -163,8 +173,39 @@ impl Scene {
     /// Share of light that passes along `ray` through masks and boundaries that are not there, at most
     /// `passes` of them; 0 where anything else stands in the way.
     #[inline]
-    pub fn transmittance(&self, ray: &Ray, _passes: u32) -> f32 {
-        if self.occluded(ray) { 0.0 } else { 1.0 }
+    pub fn transmittance(&self, ray: &Ray, passes: u32) -> f32 {
+        if !self.occluded(ray) {
+            return 1.0;
+        }
+        match self.masked {
+            true => self.through_masks(*ray, passes),
+            false => 0.0,
+        }
+    }
+
+    fn through_masks(&self, mut ray: Ray, passes: u32) -> f32 {
+        let mut through = 1.0;
+        for _ in 0..passes {
+            let Some(hit) = self.intersect(&ray) else {
+                return through;
+            };
+            through *= 1.0 - self.material(&hit).opacity(&material::at(&hit));
+            if through == 0.0 {
+                return 0.0;
+            }
+            let next = hit.spawn(ray.d);
+            ray.t_max -= ray.o.distance(next.o);
+            ray.o = next.o;
+        }
+        match self.occluded(&ray) {
+            true => 0.0,
+            false => through,
+        }
+    }
+
+    #[inline]
+    fn material(&self, hit: &Hit) -> &Material {
+        &self.materials[self.surfaces[hit.shape.0 as usize].0 as usize]
     }
 
     /// Radiance emitted at `hit` towards `hit.wo`.
@@ -249,6 +290,21 @@ impl Scene {
 impl std::fmt::Debug for Scene {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "Scene {:?}", self.counts())
+    }
+}
+
+fn plan_of_masks(plan: &mut Plan, masked: bool) {
+    match masked {
+        true => plan.add(
+            "masks",
+            "shadow rays look for the surfaces that let them through",
+            "a material is a mask or null",
+        ),
+        false => plan.add(
+            "masks",
+            "whatever a shadow ray meets blocks it",
+            "no material is a mask or null",
+        ),
     }
 }
 

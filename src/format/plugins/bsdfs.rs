@@ -64,6 +64,17 @@ const TO_UV: Param = Param::transform(
     "Maps texture coordinates before look-up (x and y of the transform).",
 );
 
+const FLIP_INVALID: Param = Param::bool(
+    "flip_invalid_normals",
+    true,
+    "Mirror bent normals that look away from the viewer, which would be black.",
+);
+const SHADOWING: Param = Param::bool(
+    "use_shadowing_function",
+    true,
+    "Darken grazing light smoothly where the bent surface would shadow itself.",
+);
+
 const fn bsdf(name: &'static str, params: &'static [Param], doc: &'static str) -> Plugin {
     Plugin::new(Category::Bsdf, name, params, doc)
 }
@@ -123,6 +134,69 @@ pub const PLUGINS: &[Plugin] = &[
         &[INT_IOR, EXT_IOR, SPECULAR_R, SPECULAR_T],
         "Smooth boundary of glass, water and the like; the normal points outside.",
     ),
+    Plugin {
+        slots: &[Slot::new(Category::Bsdf, 1, 1)],
+        ..bsdf(
+            "mask",
+            &[Param {
+                name: "opacity",
+                kind: Kind::FloatTexture(Range::Any),
+                default: Default::Float(0.5),
+                doc: "Share of the surface that is there, cut to 0 to 1.",
+            }],
+            "Lets light through as if parts of the surface were not there.",
+        )
+    },
+    Plugin {
+        slots: &[Slot::new(Category::Bsdf, 2, 2)],
+        ..bsdf(
+            "blendbsdf",
+            &[Param {
+                name: "weight",
+                kind: Kind::FloatTexture(Range::Any),
+                default: Default::Required,
+                doc: "Share of the second material, cut to 0 to 1; the rest is the first.",
+            }],
+            "Mixture of two materials.",
+        )
+    },
+    Plugin {
+        slots: &[
+            Slot::new(Category::Texture, 1, 1),
+            Slot::new(Category::Bsdf, 1, 1),
+        ],
+        ..bsdf(
+            "bumpmap",
+            &[
+                Param::float(
+                    "scale",
+                    Range::Any,
+                    1.0,
+                    "Height in scene units of a texture value of 1.",
+                ),
+                FLIP_INVALID,
+                SHADOWING,
+            ],
+            "Bends the shading normals of a material by the slopes of a texture of heights.",
+        )
+    },
+    Plugin {
+        slots: &[Slot::new(Category::Bsdf, 1, 1)],
+        ..bsdf(
+            "normalmap",
+            &[
+                Param {
+                    name: "normalmap",
+                    kind: Kind::Color(Role::Unbounded),
+                    default: Default::Required,
+                    doc: "Texture of normals: colour c is the normal 2 c - 1 in the tangent frame; its bitmap wants raw.",
+                },
+                FLIP_INVALID,
+                SHADOWING,
+            ],
+            "Replaces the shading normals of a material by those of a texture.",
+        )
+    },
     Plugin::new(
         Category::Texture,
         "bitmap",

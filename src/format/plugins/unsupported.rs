@@ -55,16 +55,15 @@ const TABLE: &[(Category, &[&str], &str)] = &[
             "difftrans",
             "hk",
             "mixturebsdf",
-            "blendbsdf",
         ],
         NEAR_BSDF,
     ),
     (
         Bsdf,
-        &["bumpmap", "normalmap", "displacement"],
-        "put the material in its place and the relief into the mesh",
+        &["displacement"],
+        "use \"bumpmap\", or put the relief into the mesh",
     ),
-    (Bsdf, &["mask", "null"], "cut the holes out of the mesh"),
+    (Bsdf, &["null"], "cut the holes out of the mesh"),
     (
         Bsdf,
         &[

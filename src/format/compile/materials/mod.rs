@@ -14,6 +14,7 @@ use crate::texture::{Picture, Texture};
 
 use super::suggest;
 
+mod composed;
 mod textures;
 
 pub struct Materials<'a> {
@@ -90,17 +91,12 @@ impl<'a> Materials<'a> {
         Ok(id)
     }
 
-    fn material(&mut self, p: &Props<'a>) -> Result<Material, SceneError> {
+    pub(super) fn material(&mut self, p: &Props<'a>) -> Result<Material, SceneError> {
         Ok(match p.plugin() {
             "twosided" => {
                 let sides = p.children(Category::Bsdf);
                 for side in &sides {
-                    if matches!(side.plugin(), "dielectric" | "twosided") {
-                        let what = format!("\"{}\" already has two sides", side.plugin());
-                        return Err(side
-                            .error(what)
-                            .with_help("use it without \"twosided\" around it"));
-                    }
+                    composed::check_one_sided(side)?;
                 }
                 let [Some(first), last] = [sides.first(), sides.last()] else {
                     return Err(p.error("\"twosided\" needs a material inside"));
@@ -112,6 +108,7 @@ impl<'a> Materials<'a> {
                 };
                 Material::TwoSided { front, back }
             }
+            "mask" | "blendbsdf" | "bumpmap" | "normalmap" => self.composed(p)?,
             "conductor" => Material::Conductor(self.metal(p)?),
             "roughconductor" => {
                 let alpha = self.scalar(p, "alpha")?;

@@ -19,16 +19,18 @@ impl<'a> Materials<'a> {
             Texture::Constant(c) => Texture::Constant(c.map(|v| v.min(1.0))),
             Texture::Bitmap(mut bitmap) => {
                 if let Texels::Floats(data) = &bitmap.texels.texels
-                    && data.iter().flatten().any(|v| *v > 1.0)
+                    && data.iter().flatten().any(|v| !(0.0..=1.0).contains(v))
                 {
-                    let at = p.error_at(name, "values above 1 are cut to 1").at;
-                    self.warnings.push(format!(
-                        "{}:{}:{}: the picture has values above 1, which as \"{name}\" are cut to 1",
-                        at.file.display(),
-                        at.line,
-                        at.column
-                    ));
-                    let cut = data.iter().map(|t| t.map(|v| v.min(1.0))).collect();
+                    if data.iter().flatten().any(|v| *v > 1.0) {
+                        let at = p.error_at(name, "values above 1 are cut to 1").at;
+                        self.warnings.push(format!(
+                            "{}:{}:{}: the picture has values above 1, which as \"{name}\" are cut to 1",
+                            at.file.display(),
+                            at.line,
+                            at.column
+                        ));
+                    }
+                    let cut = data.iter().map(|t| t.map(|v| v.clamp(0.0, 1.0))).collect();
                     bitmap.texels = Arc::new(Picture {
                         texels: Texels::Floats(cut),
                         ..*bitmap.texels
@@ -85,7 +87,7 @@ impl<'a> Materials<'a> {
                     .map(|b| picture(b, key.1))
                     .map_err(|e| p.error_at("filename", e.to_string()))?;
                 if let Texels::Floats(data) = &mut picture.texels {
-                    check_values(data, picture.width as usize)
+                    check_values(data, picture.width as usize, key.1)
                         .map_err(|what| p.error_at("filename", what))?;
                 }
                 let picture = Arc::new(picture);
@@ -151,8 +153,8 @@ fn picture(bitmap: image_io::Bitmap, raw: bool) -> Picture {
 }
 
 /// Refuses what is no number, and makes zero of what lies below: pictures that were filtered with negative
-/// lobes have a little of it, and no texture means it.
-fn check_values(data: &mut [[f32; 3]], width: usize) -> Result<(), String> {
+/// lobes have a little of it, and no texture means it but one of raw numbers.
+fn check_values(data: &mut [[f32; 3]], width: usize, raw: bool) -> Result<(), String> {
     for (i, value) in data.iter_mut().enumerate() {
         if !value.iter().all(|v| v.is_finite()) {
             return Err(format!(
@@ -161,7 +163,9 @@ fn check_values(data: &mut [[f32; 3]], width: usize) -> Result<(), String> {
                 i / width
             ));
         }
-        *value = value.map(|v| v.max(0.0));
+        if !raw {
+            *value = value.map(|v| v.max(0.0));
+        }
     }
     Ok(())
 }
