@@ -5,7 +5,7 @@ use super::desc::{Child, Given, Object, ObjectId, SceneDesc, Value};
 use super::error::{Place, SceneError};
 use super::plugins::{Category, Default, Kind, Param, Plugin, Role};
 use crate::bsdf::iors;
-use crate::math::{DVec3, Rgb, Transform};
+use crate::math::{DVec3, Motion, Rgb, Transform};
 use std::path::Path;
 
 /// A colour that is the same everywhere, or a texture.
@@ -216,6 +216,32 @@ impl<'a> Props<'a> {
             (Some(Value::Transform(t)), _) => Ok(**t),
             (None, Default::Identity) => Ok(Transform::IDENTITY),
             _ => Err(self.mistyped(name, "a transform")),
+        }
+    }
+
+    /// All the transforms that a moving one goes through, or the one that does not move.
+    pub fn keyframes(&self, name: &str) -> Result<Vec<Transform>, SceneError> {
+        let (_, given) = self.lookup(name)?;
+        Ok(match given.map(|g| &g.value) {
+            Some(Value::Transform(t)) => vec![**t],
+            Some(Value::Animation(keys)) => keys.iter().map(|key| key.1).collect(),
+            _ => vec![Transform::IDENTITY],
+        })
+    }
+
+    /// A transform that may move while the shutter is open, from `shutter[0]` to `shutter[1]` of the
+    /// scene's time; the identity where the file gives none.
+    pub fn motion(&self, name: &str, shutter: [f64; 2]) -> Result<Motion, SceneError> {
+        let (param, given) = self.lookup(name)?;
+        match (given.map(|g| &g.value), param.default) {
+            (Some(Value::Transform(t)), _) => Ok(Motion::still(**t)),
+            (Some(Value::Animation(keys)), _) => Motion::new(keys, shutter).ok_or_else(|| {
+                let what = "the animation goes through a transform that is singular";
+                self.error_at(name, what)
+                    .with_help("mirror all of its transforms or none, and flatten none of them")
+            }),
+            (None, Default::Identity) => Ok(Motion::still(Transform::IDENTITY)),
+            _ => Err(self.mistyped(name, "a transform or an animation")),
         }
     }
 

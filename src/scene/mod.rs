@@ -1,9 +1,9 @@
 //! The scene as light transport sees it: flat, indexed by ids, immutable. It knows no files and no names.
 
-mod camera;
+pub mod camera;
 mod plan;
 
-pub use camera::{Camera, FovAxis, PerspectiveSpec};
+pub use camera::{Camera, CameraSample};
 pub use plan::{Plan, PlanEntry};
 
 use crate::geom::{Accel, Geometry, Hit, Hooks, MeshRef, Ray, ShapeId};
@@ -254,6 +254,11 @@ impl Scene {
 
     pub fn emitters_can_be_met(&self) -> bool {
         self.emitters_can_be_met
+    }
+
+    /// Whether anything in the scene moves while the shutter is open.
+    pub fn moves(&self) -> bool {
+        false
     }
 
     /// The point of the world that all coordinates of the scene are relative to.

@@ -202,6 +202,16 @@ pub fn place(sources: Vec<Source>, plan: &mut Plan) -> Result<(Vec<Geometry>, DV
     Ok((shapes?, center))
 }
 
+/// One shape that is no part of the scene, relative to the scene's centre.
+pub fn alone(props: &Props, center: DVec3) -> Result<Geometry, SceneError> {
+    let source = read(props)?;
+    let (lo, hi) = bounds(&source);
+    if !(within_reach(lo) && within_reach(hi)) {
+        return Err(props.error_at("to_world", out_of_reach("a part of the shape")));
+    }
+    geometry(source, center)
+}
+
 fn geometry(source: Source, center: DVec3) -> Result<Geometry, SceneError> {
     let Source {
         props,
