@@ -238,13 +238,6 @@ pub fn camera(sensor: &Props, film: &FilmSpec, center: DVec3) -> Result<Camera, 
             format!("near_clip {near} is not below far_clip {far}"),
         ));
     }
-    let open_close = [
-        sensor.float("shutter_open")?,
-        sensor.float("shutter_close")?,
-    ];
-    if open_close[0] > open_close[1] {
-        return Err(sensor.error_at("shutter_open", "the shutter closes before it opens"));
-    }
     // A pinhole is sharp at every distance.
     sensor.ignore(&["focus_distance"]);
     let (fov_deg, fov_axis) = match sensor.opt_float("fov")? {
@@ -276,6 +269,18 @@ pub fn camera(sensor: &Props, film: &FilmSpec, center: DVec3) -> Result<Camera, 
         far_clip: far,
     };
     Ok(Camera::perspective(&spec, film, center))
+}
+
+/// When the shutter opens and closes, in the scene's time.
+pub fn shutter(sensor: &Props) -> Result<[f64; 2], SceneError> {
+    let [open, close] = [
+        sensor.float("shutter_open")?,
+        sensor.float("shutter_close")?,
+    ];
+    if open > close {
+        return Err(sensor.error_at("shutter_open", "the shutter closes before it opens"));
+    }
+    Ok([open, close])
 }
 
 /// Diagonal field of view, in degrees, of a lens on 35 mm film (36 x 24 mm).

@@ -6,8 +6,7 @@ mod integrator;
 mod lights;
 mod materials;
 mod shapes;
-
-use rayon::prelude::*;
+mod world;
 
 use super::error::command_line;
 use super::plugins::Category;
@@ -18,6 +17,7 @@ use crate::render::{AovLayer, Job};
 use crate::scene::{Plan, Scene};
 use crate::transport::aov::Aov;
 use materials::Materials;
+use world::Layout;
 
 /// What the command line asks for in place of what the scene says.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -68,9 +68,10 @@ pub fn compile(desc: &SceneDesc, overrides: &Overrides) -> Result<Compiled, Scen
         });
     }
 
-    let shape_props = root.children(Category::Shape);
-    let sources: Result<Vec<_>, SceneError> = shape_props.par_iter().map(shapes::read).collect();
-    let (shapes, center) = shapes::place(sources?, &mut plan)?;
+    let shutter = film::shutter(&sensor)?;
+    let layout = Layout::new(&root, shutter, &mut warnings)?;
+    let (world, center) = layout.build(&mut plan)?;
+    let shape_props = layout.shapes;
     let mut materials = Materials::new(desc);
     let mut surfaces = Vec::with_capacity(shape_props.len());
     for props in &shape_props {
@@ -85,7 +86,7 @@ pub fn compile(desc: &SceneDesc, overrides: &Overrides) -> Result<Compiled, Scen
     desc.check_all_read()?;
     Ok(Compiled {
         job: Job {
-            scene: Scene::new(shapes, surfaces, materials, lights, center, plan),
+            scene: Scene::with_world(world, surfaces, materials, lights, center, plan),
             camera,
             film: film.spec,
             sampler: sampler.kind,

@@ -1,17 +1,12 @@
-//! Shapes: files are read and placed in the world in f64; only when the centre of the scene is known are
-//! coordinates rounded, relative to it.
-
-use rayon::prelude::*;
+//! Shapes: files are read and placed in the coordinates of the world, or of a group, in f64; only when
+//! their centre is known are coordinates rounded, relative to it.
 
 use crate::format::mesh_io::{self, MeshData};
 use crate::format::{Props, SceneError};
 use crate::geom::{Cylinder, Disk, Geometry, Mesh, Sphere};
 use crate::math::{DVec3, Transform, Vec3};
-use crate::scene::Plan;
 
-use super::{out_of_reach, within_reach};
-
-/// A shape whose place in the world is known but not yet rounded.
+/// A shape whose place in the world, or in its group, is known but not yet rounded.
 pub struct Source<'a> {
     props: Props<'a>,
     kind: Kind,
@@ -32,11 +27,17 @@ enum Kind {
     Cylinder,
 }
 
-/// Reads one shape, its file included.
-pub fn read<'a>(props: &Props<'a>) -> Result<Source<'a>, SceneError> {
+impl<'a> Source<'a> {
+    pub fn props(&self) -> &Props<'a> {
+        &self.props
+    }
+}
+
+/// Reads one shape, its file included. `to_world` takes it to the world, or to the coordinates of its
+/// group.
+pub fn read<'a>(props: &Props<'a>, mut to_world: Transform) -> Result<Source<'a>, SceneError> {
     // Of no use without derivatives.
     props.ignore(&["silhouette_sampling_weight"]);
-    let mut to_world = props.transform("to_world")?;
     let kind = match props.plugin() {
         "rectangle" | "cube" => {
             // Flat faces have the same normals either way.
@@ -134,8 +135,8 @@ fn mesh(props: &Props, to_world: &Transform) -> Result<Kind, SceneError> {
     Ok(Kind::Mesh { data, smooth })
 }
 
-/// Least and greatest coordinates of a shape in the world.
-fn bounds(source: &Source) -> (DVec3, DVec3) {
+/// Least and greatest coordinates of a shape.
+pub fn bounds(source: &Source) -> (DVec3, DVec3) {
     if let Kind::Mesh { data, .. } = &source.kind {
         let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         return data
@@ -155,54 +156,8 @@ fn bounds(source: &Source) -> (DVec3, DVec3) {
         })
 }
 
-/// Distance of the scene from the origin, in radii of the scene, up to which its coordinates stay as they
-/// are: within, moving it would gain less than three bits.
-const NEAR_ORIGIN: f64 = 4.0;
-
-/// Chooses the centre and makes the shapes relative to it.
-pub fn place(sources: Vec<Source>, plan: &mut Plan) -> Result<(Vec<Geometry>, DVec3), SceneError> {
-    let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for source in &sources {
-        let (l, h) = bounds(source);
-        // NaN is out of reach too.
-        if !(within_reach(l) && within_reach(h)) {
-            let what = out_of_reach("a part of the shape");
-            return Err(source.props.error_at("to_world", what));
-        }
-        (lo, hi) = (lo.min(l), hi.max(h));
-    }
-    let middle = 0.5 * (lo + hi);
-    let radius = 0.5 * (hi - lo).length();
-    let center = if sources.is_empty() || middle.length() <= NEAR_ORIGIN * radius {
-        DVec3::ZERO
-    } else {
-        middle
-    };
-    if center == DVec3::ZERO {
-        plan.add(
-            "coordinates",
-            "as they are",
-            "the scene lies near the origin",
-        );
-    } else {
-        let reason = format!(
-            "the scene lies {:.3e} of its radii from the origin",
-            middle.length() / radius
-        );
-        plan.add(
-            "coordinates",
-            format!("relative to ({}, {}, {})", center.x, center.y, center.z),
-            reason,
-        );
-    }
-    let shapes: Result<Vec<_>, _> = sources
-        .into_par_iter()
-        .map(|s| geometry(s, center))
-        .collect();
-    Ok((shapes?, center))
-}
-
-fn geometry(source: Source, center: DVec3) -> Result<Geometry, SceneError> {
+/// The shape in f32, relative to `center` of its coordinates.
+pub fn geometry(source: Source, center: DVec3) -> Result<Geometry, SceneError> {
     let Source {
         props,
         kind,

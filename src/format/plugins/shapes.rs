@@ -3,7 +3,7 @@
 use super::{Category, Param, Plugin, Range, Slot};
 
 const FLIP: Param = Param::bool("flip_normals", false, "Turn the normals to the other side.");
-const TO_WORLD: Param = Param::transform("to_world", "Places the shape in the world.");
+const TO_WORLD: Param = Param::motion("to_world", "Places the shape in the world.");
 const SILHOUETTE: Param = Param::float(
     "silhouette_sampling_weight",
     Range::NonNegative,
@@ -98,4 +98,25 @@ pub const PLUGINS: &[Plugin] = &[
         ],
         "Cylinder without caps, with normals outwards.",
     ),
+    Plugin {
+        slots: &[Slot::new(Category::Shape, 0, usize::MAX)],
+        ..Plugin::new(
+            Category::Shape,
+            "shapegroup",
+            &[],
+            "Shapes that are not there by themselves, but wherever an instance places them.",
+        )
+    },
+    Plugin {
+        slots: &[Slot::new(Category::Shape, 1, 1)],
+        ..Plugin::new(
+            Category::Shape,
+            "instance",
+            &[
+                Param::motion("to_world", "Places the group in the world."),
+                SILHOUETTE,
+            ],
+            "The shapes of a shapegroup, in one more place.",
+        )
+    },
 ];
