@@ -97,7 +97,9 @@ fn hits_are_those_of_the_scene_written_out() {
                     && (x.uv - y.uv).abs().max_element() < 2e-4;
                 // uv and frame of disks and spheres turn fast about their centres and poles.
                 odd += usize::from(!same);
-                assert!(close(x.p, y.p, (x.p_err + y.p_err).max_element() + 2e-6));
+                // Along the surface a rounding of the ray moves the point far where it is grazed.
+                let off = (x.p - y.p).dot(x.ng).abs();
+                assert!(off <= (x.p_err + y.p_err).max_element(), "{x:?} {y:?}");
                 let (u, v) = (a.dp_duv(&x), b.dp_duv(&y));
                 assert!(close(u.0, v.0, 1e-2) && close(u.1, v.1, 1e-2) || !same);
             }
@@ -132,15 +134,16 @@ fn pictures_are_those_of_the_scene_written_out() {
 }
 
 /// One closed mesh or sphere, far from its own origin or not, placed with `scale` at `at`.
-fn placed(geometry: Geometry, scale: DVec3, at: DVec3) -> World {
+fn placed(geometry: Geometry, scale: DVec3, at: DVec3) -> (World, Transform) {
     let turn = Transform::rotate(DVec3::new(1.0, 2.0, -0.5), 33.0).unwrap();
-    let motion = Motion::still(Transform::translate(at) * turn * Transform::scale(scale).unwrap());
-    let group = GroupId(0);
-    World::with_places(
+    let place = Transform::translate(at) * turn * Transform::scale(scale).unwrap();
+    let (group, motion) = (GroupId(0), Motion::still(place));
+    let world = World::with_places(
         vec![geometry],
         &[vec![ShapeId(0)]],
         vec![Placement { group, motion }],
-    )
+    );
+    (world, place)
 }
 
 fn sphere() -> Geometry {
@@ -162,9 +165,9 @@ fn no_ray_leaks_or_meets_the_surface_it_leaves() {
             for offset in [0.0, 1.0, 1e3] {
                 let at = DVec3::new(1.0, -0.7, 0.4) * offset * scale;
                 for geometry in [cube(), sphere()] {
-                    let world = placed(geometry, stretch * scale, at);
+                    let (world, place) = placed(geometry, stretch * scale, at);
                     for _ in 0..2000 {
-                        check_at(&world, scale as f32, at.as_vec3(), &mut rng);
+                        check_at(&world, scale as f32, &place, &mut rng);
                     }
                 }
             }
@@ -176,7 +179,8 @@ fn direction(rng: &mut Rng) -> Vec3 {
     luxel::math::warp::uniform_sphere(rng.vec2())
 }
 
-fn check_at(world: &World, scale: f32, at: Vec3, rng: &mut Rng) {
+fn check_at(world: &World, scale: f32, place: &Transform, rng: &mut Rng) {
+    let at = place.point(DVec3::ZERO).as_vec3();
     // From about the middle out.
     let from = at + direction(rng) * (0.02 * scale);
     let out = Ray::new(from, direction(rng));
@@ -184,6 +188,12 @@ fn check_at(world: &World, scale: f32, at: Vec3, rng: &mut Rng) {
     assert!(world.occluded(&out));
     assert!(hit.frame.s.is_finite() && hit.ng.is_normalized() && hit.p_err.is_finite());
     let far = (hit.p - at).length();
+    // Where a face ends within the error of the point, that may lie outside of the next one.
+    let local = place.inverse().point(hit.p.as_dvec3()).abs();
+    let err = place.inverse().matrix().matrix3.abs() * hit.p_err.as_dvec3();
+    let mut to_side = ((local - 1.0).abs() - 4.0 * err).to_array();
+    to_side.sort_by(f64::total_cmp);
+    let on_edge = world.geometries()[0].is_mesh() && to_side[1] < 0.0;
     // Almost along the surface too.
     let flat = |w: Vec3, k: f32| (w - hit.ng * w.dot(hit.ng) * (1.0 - k)).normalize();
     let w = direction(rng);
@@ -191,7 +201,7 @@ fn check_at(world: &World, scale: f32, at: Vec3, rng: &mut Rng) {
         let w = flat(w, k);
         let leaving = hit.spawn(w);
         match world.intersect(&leaving, false) {
-            None => assert!(w.dot(hit.ng) > 0.0, "a ray leaks out along {w}"),
+            None => assert!(on_edge || w.dot(hit.ng) >= 0.0, "a ray leaks out along {w}"),
             // Inwards: not the same place again. A cube's edge may be near.
             Some(next) => {
                 assert!(w.dot(hit.ng) < 1e-4, "the surface shadows itself along {w}");

@@ -43,7 +43,8 @@ impl Placement {
         };
         let frame = match tangents {
             true => Frame::from_tangent(ns, vector(to_world, geometry.dp_duv(&hit).0)),
-            false => Frame::from_normal(ns),
+            false if geometry.is_mesh() => Frame::from_normal(ns),
+            false => Frame::from_tangent(ns, vector(to_world, hit.frame.s)),
         };
         Hit {
             p,
