@@ -83,7 +83,7 @@ impl Scene {
             false => plan.add("tangents", "none", "no material is anisotropic"),
         }
         let mixed = materials.iter().any(Material::is_mixed);
-        let lights = Lights::new(emitters, world.geometries());
+        let lights = Lights::in_world(emitters, &world);
         plan_of_world(&mut plan, &world);
         plan_of_lights(&mut plan, &lights, emitters_can_be_met);
         Scene {

@@ -12,6 +12,7 @@ mod split;
 
 pub use deform::{DeformError, Deforming};
 pub use place::Placement;
+pub(crate) use place::{normal, point};
 
 use super::{Accel, Geometry, Hit, Hooks, MeshRef, RawHit, Ray, ShapeId};
 use crate::math::{Aabb, Vec2, Vec3};
@@ -63,6 +64,8 @@ pub struct World {
     top: Level,
     groups: Vec<Level>,
     places: Vec<Placement>,
+    /// By shape: the first placement of its group.
+    placed: Vec<PlaceId>,
 }
 
 /// Shapes that share coordinates.
@@ -119,9 +122,19 @@ impl World {
         places: Vec<Placement>,
     ) -> World {
         let mut free = vec![true; geometries.len()];
-        for shape in groups.iter().flatten() {
-            if let Some(free) = free.get_mut(shape.0 as usize) {
-                *free = false;
+        let mut placed = vec![PlaceId::NONE; geometries.len()];
+        let mut first = vec![PlaceId::NONE; groups.len()];
+        for (i, place) in places.iter().enumerate().rev() {
+            if let Some(first) = first.get_mut(place.group.0 as usize) {
+                *first = PlaceId(i as u32);
+            }
+        }
+        for (shapes, first) in groups.iter().zip(first) {
+            for shape in shapes.iter().map(|s| s.0 as usize) {
+                if shape < free.len() {
+                    free[shape] = false;
+                    placed[shape] = first;
+                }
             }
         }
         let ids = (0..geometries.len() as u32).map(ShapeId);
@@ -148,6 +161,7 @@ impl World {
             top,
             groups,
             places,
+            placed,
         }
     }
 
@@ -159,6 +173,12 @@ impl World {
     /// By [`PlaceId`].
     pub fn places(&self) -> &[Placement] {
         &self.places
+    }
+
+    /// Where the group of `shape` stands, if it is in one: the first of its placements.
+    pub fn placement_of(&self, shape: ShapeId) -> Option<&Placement> {
+        let place = self.placed.get(shape.0 as usize)?;
+        self.places.get(place.0 as usize)
     }
 
     /// The nearest surface along `ray`. Only with `tangents` do shading frames follow dp/du.
