@@ -219,6 +219,16 @@ impl<'a> Props<'a> {
         }
     }
 
+    /// All the transforms that a moving one goes through, or the one that does not move.
+    pub fn keyframes(&self, name: &str) -> Result<Vec<Transform>, SceneError> {
+        let (_, given) = self.lookup(name)?;
+        Ok(match given.map(|g| &g.value) {
+            Some(Value::Transform(t)) => vec![**t],
+            Some(Value::Animation(keys)) => keys.iter().map(|key| key.1).collect(),
+            _ => vec![Transform::IDENTITY],
+        })
+    }
+
     /// A transform that may move while the shutter is open, from `shutter[0]` to `shutter[1]` of the
     /// scene's time; the identity where the file gives none.
     pub fn motion(&self, name: &str, shutter: [f64; 2]) -> Result<Motion, SceneError> {

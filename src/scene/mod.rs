@@ -1,9 +1,9 @@
 //! The scene as light transport sees it: flat, indexed by ids, immutable. It knows no files and no names.
 
-mod camera;
+pub mod camera;
 mod plan;
 
-pub use camera::{Camera, FovAxis, PerspectiveSpec};
+pub use camera::{Camera, CameraSample};
 pub use plan::{Plan, PlanEntry};
 
 use crate::geom::{Geometry, Hit, Ray, ShapeId, World};
@@ -188,6 +188,11 @@ impl Scene {
         self.emitters_can_be_met
     }
 
+    /// Whether anything in the scene moves while the shutter is open.
+    pub fn moves(&self) -> bool {
+        self.world.moves()
+    }
+
     /// The point of the world that all coordinates of the scene are relative to.
     pub fn center(&self) -> DVec3 {
         self.center
@@ -239,11 +244,11 @@ fn plan_of_world(plan: &mut Plan, world: &World) {
         }
     }
     match world.moving() {
-        (0, _) => plan.add("motion", "none", "no shape moves while the shutter is open"),
+        (0, _) => {}
         (n, stretches) => {
             let decision = format!("{stretches} boxes, each for a stretch of time");
             let reason = format!("of {n} shapes that move while the shutter is open");
-            plan.add("motion", decision, reason);
+            plan.add("moving shapes", decision, reason);
         }
     }
 }

@@ -1,6 +1,7 @@
 //! From the description of a scene to a job that can be rendered: every default settled, every name
 //! turned into an index, the plan made.
 
+mod camera;
 mod film;
 mod integrator;
 mod lights;
@@ -10,7 +11,7 @@ mod world;
 
 use super::error::command_line;
 use super::plugins::Category;
-use super::{Props, SceneDesc, SceneError, did_you_mean, list};
+use super::{SceneDesc, SceneError, did_you_mean, list};
 use crate::film::Window;
 use crate::math::DVec3;
 use crate::render::{AovLayer, Job};
@@ -57,9 +58,10 @@ pub fn compile(desc: &SceneDesc, overrides: &Overrides) -> Result<Compiled, Scen
     let root = desc.scene();
     let mut plan = Plan::default();
     let mut warnings = Vec::new();
-    let sensor = the_sensor(&root, &mut warnings)?;
-    let film = film::film(&sensor, overrides)?;
-    let sampler = film::sampler(&sensor, overrides, &mut plan)?;
+    let sensor = camera::the_sensor(&root, &root.children(Category::Shape), &mut warnings)?;
+    let shutter = camera::shutter(&sensor.props)?;
+    let mut film = film::film(&sensor.props, overrides)?;
+    let sampler = film::sampler(&sensor.props, overrides, &mut plan)?;
     let (integrator, mut aovs) = integrator::integrator(&root, overrides)?;
     if film.pixel_format.has_alpha() {
         aovs.push(AovLayer {
@@ -68,9 +70,9 @@ pub fn compile(desc: &SceneDesc, overrides: &Overrides) -> Result<Compiled, Scen
         });
     }
 
-    let shutter = film::shutter(&sensor)?;
     let layout = Layout::new(&root, shutter, &mut warnings)?;
     let (world, center) = layout.build(&mut plan)?;
+    let measured = layout.measured(&sensor)?;
     let shape_props = layout.shapes;
     let mut materials = Materials::new(desc);
     let mut surfaces = Vec::with_capacity(shape_props.len());
@@ -81,7 +83,8 @@ pub fn compile(desc: &SceneDesc, overrides: &Overrides) -> Result<Compiled, Scen
     if lights.is_empty() {
         warnings.push("the scene has no emitter, so the picture is black".to_string());
     }
-    let camera = film::camera(&sensor, &film.spec, center)?;
+    let camera = camera::camera(&sensor, shutter, &mut film.spec, (&world, measured), center)?;
+    camera::plan(&camera, camera.moves() || world.moves(), shutter, &mut plan);
     let materials = materials.finish(&mut plan, &mut warnings);
     desc.check_all_read()?;
     Ok(Compiled {
@@ -124,21 +127,4 @@ fn on_command_line(option: &str, value: &str, what: impl Into<String>) -> SceneE
 /// A help line for a name that is not among `names`: the nearest one, or all of them.
 fn suggest<'a>(found: &str, names: impl IntoIterator<Item = &'a str> + Clone) -> String {
     did_you_mean(found, names.clone()).unwrap_or_else(|| format!("there are {}", list(names)))
-}
-
-fn the_sensor<'a>(root: &Props<'a>, warnings: &mut Vec<String>) -> Result<Props<'a>, SceneError> {
-    let sensors = root.children(Category::Sensor);
-    if sensors.len() > 1 {
-        warnings.push(format!(
-            "the scene has {} sensors: the first one is rendered",
-            sensors.len()
-        ));
-    }
-    for unused in sensors.iter().skip(1) {
-        unused.ignore_all();
-    }
-    sensors.into_iter().next().ok_or_else(|| {
-        root.error("the scene has no sensor")
-            .with_help("add <sensor type=\"perspective\"> to say where to look from")
-    })
 }

@@ -6,6 +6,8 @@ use crate::format::{Props, SceneError};
 use crate::geom::{Cylinder, Disk, Geometry, Mesh, Sphere};
 use crate::math::{DVec3, Transform, Vec3};
 
+use super::{out_of_reach, within_reach};
+
 /// A shape whose place in the world, or in its group, is known but not yet rounded.
 pub struct Source<'a> {
     props: Props<'a>,
@@ -154,6 +156,16 @@ pub fn bounds(source: &Source) -> (DVec3, DVec3) {
         .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), p| {
             (lo.min(p), hi.max(p))
         })
+}
+
+/// One shape that is no part of the scene, relative to the scene's centre.
+pub fn alone(props: &Props, center: DVec3) -> Result<Geometry, SceneError> {
+    let source = read(props, props.transform("to_world")?)?;
+    let (lo, hi) = bounds(&source);
+    if !(within_reach(lo) && within_reach(hi)) {
+        return Err(props.error_at("to_world", out_of_reach("a part of the shape")));
+    }
+    geometry(source, center)
 }
 
 /// The shape in f32, relative to `center` of its coordinates.

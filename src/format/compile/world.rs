@@ -7,6 +7,7 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
+use super::camera::Sensor;
 use super::shapes::{self, Source};
 use super::{out_of_reach, within_reach};
 use crate::format::plugins::Category;
@@ -164,6 +165,21 @@ impl<'a> Layout<'a> {
             self.groups[id.0 as usize].push(member);
         }
         Ok(id)
+    }
+
+    /// The shape that `sensor` stands in.
+    pub fn measured(&self, sensor: &Sensor) -> Result<Option<ShapeId>, SceneError> {
+        let Some(shape) = &sensor.shape else {
+            return Ok(None);
+        };
+        let same = |s: &Props| s.object_id() == shape.object_id();
+        match self.shapes.iter().position(same) {
+            Some(i) if self.stands[i].1.is_none() => Ok(Some(ShapeId(i as u32))),
+            _ => Err(sensor
+                .props
+                .error("an irradiance meter measures a shape that stands still")
+                .with_help("leave the <animation> out, or use a sensor beside the shape")),
+        }
     }
 
     /// Reads the shapes, chooses the centre of the scene and of each group, and makes all relative to it.

@@ -9,6 +9,7 @@ mod bsdfs;
 mod cameras;
 mod lights;
 mod reference;
+mod sensors;
 mod shapes;
 mod unsupported;
 
@@ -413,6 +414,7 @@ impl fmt::Display for Plugin {
 pub fn all() -> impl Iterator<Item = &'static Plugin> {
     [
         cameras::PLUGINS,
+        sensors::PLUGINS,
         shapes::PLUGINS,
         bsdfs::PLUGINS,
         lights::PLUGINS,

@@ -18,6 +18,7 @@ const FACE: Param = Param::bool(
 const SLOTS: &[Slot] = &[
     Slot::new(Category::Bsdf, 0, 1),
     Slot::new(Category::Emitter, 0, 1),
+    Slot::new(Category::Sensor, 0, 1),
 ];
 
 const fn shape(name: &'static str, params: &'static [Param], doc: &'static str) -> Plugin {

@@ -10,7 +10,6 @@ const DERIVATIVE: &str = "luxel computes no derivatives; use the integrator \"pa
 const RGB: &str = "luxel renders in RGB; write the colour with <rgb>";
 const BAKE: &str = "bake the texture into an image and use the texture \"bitmap\"";
 const NEAR_BSDF: &str = "use the nearest of diffuse, conductor, roughconductor and dielectric";
-const PINHOLE: &str = "use the sensor \"perspective\"";
 
 const TABLE: &[(Category, &[&str], &str)] = &[
     (
@@ -117,25 +116,18 @@ const TABLE: &[(Category, &[&str], &str)] = &[
     (
         Sensor,
         &[
-            "thinlens",
-            "orthographic",
             "spherical",
             "telecentric",
             "perspective_rdist",
             "batch",
+            "mpath",
         ],
-        PINHOLE,
+        "use one of the sensors \"perspective\", \"thinlens\" and \"orthographic\"",
     ),
     (
         Sensor,
-        &[
-            "radiancemeter",
-            "irradiancemeter",
-            "fluencemeter",
-            "distant",
-            "mpath",
-        ],
-        PINHOLE,
+        &["fluencemeter"],
+        "use the sensor \"irradiancemeter\" inside a shape",
     ),
     (
         Film,

@@ -66,6 +66,7 @@ pub struct World {
     places: Vec<Placement>,
     /// By shape: the first placement of its group.
     placed: Vec<PlaceId>,
+    moves: bool,
 }
 
 /// Shapes that share coordinates.
@@ -156,7 +157,12 @@ impl World {
             pieces.into_iter().map(move |p| p.stretch(what))
         });
         let top = Level::build(&geometries, &top, boxes.collect());
+        let moves = places.iter().any(|p| p.motion.as_still().is_none())
+            || geometries
+                .iter()
+                .any(|g| matches!(g, Geometry::Deforming(_)));
         World {
+            moves,
             geometries,
             top,
             groups,
@@ -256,6 +262,11 @@ impl World {
     /// The box of everything that can be hit, at whatever time; empty for an empty world.
     pub fn bounds(&self) -> Aabb {
         self.top.accel.bounds()
+    }
+
+    /// Whether anything changes while the shutter is open.
+    pub fn moves(&self) -> bool {
+        self.moves
     }
 
     /// How many placements and deforming meshes change while the shutter is open, and into how many
