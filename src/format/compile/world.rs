@@ -26,6 +26,8 @@ pub struct Layout<'a> {
     groups: Vec<Vec<ShapeId>>,
     /// What places a group, and by which motion.
     places: Vec<(Props<'a>, GroupId, Motion)>,
+    /// Whether the shutter is open for any time at all.
+    time_passes: bool,
 }
 
 /// Least and greatest coordinates of what shares coordinates.
@@ -51,6 +53,7 @@ impl<'a> Layout<'a> {
             stands: Vec::new(),
             groups: Vec::new(),
             places: Vec::new(),
+            time_passes: shutter[0] < shutter[1],
         };
         let mut known = HashMap::new();
         let mut defined = Vec::new();
@@ -64,13 +67,15 @@ impl<'a> Layout<'a> {
         for group in defined {
             if !known.contains_key(&group.object_id()) {
                 group.ignore_all();
-                let at = group.place();
-                warnings.push(format!(
-                    "{}:{}:{}: no instance places this shapegroup, so it is not there",
-                    at.file.display(),
-                    at.line,
-                    at.column
-                ));
+                let lost = "no instance places this shapegroup, so it is not there";
+                warnings.push(at(&group, lost));
+            }
+        }
+        if !layout.time_passes {
+            let changes = |s: &&Props| s.is_given("filename_end");
+            for shape in layout.shapes.iter().filter(changes) {
+                let no_time = "filename_end has no effect, as the shutter closes when it opens; give the sensor a shutter_close";
+                warnings.push(at(shape, no_time));
             }
         }
         Ok(layout)
@@ -145,7 +150,10 @@ impl<'a> Layout<'a> {
         let id = self.add_group();
         for shape in group.children(Category::Shape) {
             if matches!(shape.plugin(), "shapegroup" | "instance") {
-                let what = format!("a {} cannot stand in a shapegroup", shape.plugin());
+                let what = format!(
+                    "the shape \"{}\" cannot stand in a shapegroup",
+                    shape.plugin()
+                );
                 let help = "list the shapes themselves in each group";
                 return Err(shape.error(what).with_help(help));
             }
@@ -186,7 +194,7 @@ impl<'a> Layout<'a> {
     pub fn build(&self, plan: &mut Plan) -> Result<(World, DVec3), SceneError> {
         let stands = self.shapes.par_iter().zip(&self.stands);
         let sources: Vec<Source> = stands
-            .map(|(shape, (to_level, _))| shapes::read(shape, *to_level))
+            .map(|(shape, (to_level, _))| shapes::read(shape, *to_level, self.time_passes))
             .collect::<Result<_, SceneError>>()?;
         let mut top = Extent::EMPTY;
         let mut groups = vec![Extent::EMPTY; self.groups.len()];
@@ -228,6 +236,13 @@ impl<'a> Layout<'a> {
         let world = World::with_places(geometries, &self.groups, places.collect());
         Ok((world, center))
     }
+}
+
+/// A warning with its place.
+fn at(props: &Props, what: &str) -> String {
+    let at = props.place();
+    let (file, line, column) = (at.file.display(), at.line, at.column);
+    format!("{file}:{line}:{column}: {what}")
 }
 
 fn check_reach(props: &Props, lo: DVec3, hi: DVec3) -> Result<(), SceneError> {
