@@ -47,18 +47,21 @@ const SHINING: &str = r#"<emitter type="area"><rgb name="radiance" value="1"/></
 
 #[test]
 fn a_moving_square_leaves_a_streak() {
-    // Of width 0.1, over a way of 2: each place of the streak is covered for a twentieth of the time.
-    let small = r#"<scale value="0.05"/><translate x="-1"/>"#;
+    // Of width 0.5, over a way of 2: each place of the streak is covered for a quarter of the time.
+    let small = r#"<scale value="0.25"/><translate x="-1"/>"#;
     let content = format!(
         r#"<shape type="rectangle">{}{SHINING}</shape>"#,
         animation(small, &small.replace("-1", "1"))
     );
-    let mean = |x: f64, half: f64, seed| {
-        render::mean_and_error(&render::scene(1, &ortho(4, x, half), &content), 1024, seed)
-    };
-    render::assert_explained(mean(0.0, 0.04, 1), 0.05, "the middle");
-    // The ends are a ramp from 1.05 to 0.95.
-    render::assert_explained(mean(1.0, 0.05, 2), 0.025, "the end");
+    let scene = |x: f64| render::scene(1, &ortho(16, x, 0.2), &content);
+    let middle = render::mean_and_error(&scene(0.0), 8192, 1);
+    render::assert_explained(middle, 0.25, "the middle");
+    // At both ends it fades over the width of the square.
+    for x in [-1.0, 1.0] {
+        let end = render::picture(&scene(x), 1024, 2);
+        let off = render::mean_of(&end) / 0.125 - 1.0;
+        assert!(off.abs() < 0.01, "{x}: {off}");
+    }
 }
 
 #[test]
@@ -240,9 +243,9 @@ fn moving_lights_are_the_average_of_still_ones() {
 /// A sphere that is stretched on its way shines by either way of sampling it alike.
 #[test]
 fn density_of_lights_that_stretch_is_that_of_their_samples() {
-    let squeezed = r#"<scale x="1.5" y="0.4" z="0.8"/><rotate x="1" angle="30"/><translate x="-0.6" z="0.6"/>"#;
+    let squeezed = r#"<scale x="1.5" y="0.6" z="0.8"/><rotate x="1" angle="30"/><translate x="-0.6" z="0.6"/>"#;
     let stretched =
-        r#"<scale x="0.5" y="0.9" z="0.3"/><rotate y="1" angle="80"/><translate x="0.7" z="0.9"/>"#;
+        r#"<scale x="0.8" y="1.2" z="0.4"/><rotate y="1" angle="80"/><translate x="0.7" z="0.9"/>"#;
     let lamp = |kind: &str| {
         format!(
             r#"<shape type="{kind}">{}<emitter type="area"/></shape>
@@ -261,7 +264,7 @@ fn density_of_lights_that_stretch_is_that_of_their_samples() {
             let content = lamp(kind);
             let xml = format!(
                 r#"<scene version="3.0.0">{direct}{}{content}</scene>"#,
-                camera(8, 50.0)
+                camera(12, 50.0)
             );
             render::mean_and_error(&xml, 256, 20 + seed as u64)
         };
@@ -269,7 +272,7 @@ fn density_of_lights_that_stretch_is_that_of_their_samples() {
         let both = mean(1, 1);
         for (what, (other, err)) in [("bsdf", by_bsdf), ("both", both)] {
             let sigma = by_light.1.hypot(err);
-            assert!(sigma < 3e-3 * other, "{kind}: {sigma} of {other}");
+            assert!(sigma < 2.2e-3 * other, "{kind}: {sigma} of {other}");
             assert!(
                 (by_light.0 - other).abs() < 4.5 * sigma,
                 "{kind}, {what}: {by_light:?} {other} +- {err}"
@@ -432,7 +435,7 @@ fn hits_at_any_time_are_those_of_a_still_shape() {
         World::with_places(shapes(), &[vec![ShapeId(0), ShapeId(1)]], vec![place])
     };
     let moving = world(motion.clone());
-    assert!(moving.moving().1 > 8, "{:?}", moving.moving());
+    assert!(moving.moving().1 >= 8, "{:?}", moving.moving());
     let mut rng = Rng::new(4);
     let (mut met, edges) = (0, [0.0, 1.0, 0.5, 1.0 / 32.0]);
     for i in 0..4000 {
