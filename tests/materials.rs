@@ -10,7 +10,7 @@ use common::Rng;
 use glam::Affine2;
 use luxel::bsdf::{Bsdf, Diffuse, Microfacet, Mode, RoughConductor, Shape};
 use luxel::bsdf::{Conductor, Density};
-use luxel::geom::{Hit, ShapeId};
+use luxel::geom::{Hit, PlaceId, ShapeId};
 use luxel::material::{Map, Material, Relief, Shading};
 use luxel::math::warp::uniform_sphere;
 use luxel::math::{Frame, Rgb, Vec2, Vec3};
@@ -42,6 +42,7 @@ fn hit(wo: Vec3, uv: Vec2) -> Hit {
         wo,
         time: 0.0,
         shape: ShapeId(0),
+        place: PlaceId::NONE,
         prim: 0,
         bary: Vec2::ZERO,
     }

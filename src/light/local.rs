@@ -63,8 +63,11 @@ fn bounded(pdf: f64) -> f32 {
 
 /// The parts of shape `shape`.
 pub(crate) fn parts_of(shape: ShapeId, geometry: &Geometry) -> Vec<Part> {
-    let Geometry::Mesh(mesh) = geometry else {
-        return vec![Part::Whole { shape }];
+    let mesh = match geometry {
+        Geometry::Mesh(mesh) => mesh,
+        // What changes its form is met, but not aimed at.
+        Geometry::Deforming(_) => return vec![],
+        _ => return vec![Part::Whole { shape }],
     };
     let count = mesh.indices().len() as u32;
     let mut parts = Vec::new();

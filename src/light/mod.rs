@@ -6,16 +6,17 @@
 
 pub mod env;
 mod local;
+mod moving;
 mod rectangle;
 mod tree;
 
 pub use env::{EnvError, EnvMap};
 
 use crate::bsdf::Density;
-use crate::geom::{Endpoint, Geometry, Hit, Ray, ShapeId};
+use crate::geom::{Endpoint, Geometry, Hit, Ray, ShapeId, World};
 use crate::math::fp::ONE_MINUS_EPSILON;
 use crate::math::warp::{self, AliasTable};
-use crate::math::{Aabb, PI, Rgb, Vec2, Vec3};
+use crate::math::{Aabb, Motion, PI, Rgb, Vec2, Vec3};
 use local::Part;
 use tree::{LightBounds, LightTree};
 
@@ -78,6 +79,8 @@ impl EmitterSample {
 struct Item {
     emitter: u32,
     what: What,
+    /// Of a surface that moves: its place among the motions.
+    motion: Option<u32>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -124,6 +127,8 @@ pub struct Lights {
     surfaces: Vec<Option<Surface>>,
     /// By emitting primitive: its item, or [`NO_ITEM`] for those without area.
     item_of: Vec<u32>,
+    /// Of surfaces that move, from their own coordinates to the world.
+    motions: Vec<Motion>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -140,7 +145,22 @@ impl Lights {
         Lights::with_strategy(emitters, geoms, Strategy::Auto)
     }
 
+    /// The same for the shapes of `world`, where an emitter may be in a group that one placement moves.
+    pub fn in_world(emitters: Vec<Emitter>, world: &World) -> Lights {
+        let motion = |shape| world.placement_of(shape).map(|p| p.motion.clone());
+        Lights::build(emitters, world.geometries(), &motion, Strategy::Auto)
+    }
+
     pub fn with_strategy(emitters: Vec<Emitter>, geoms: &[Geometry], strategy: Strategy) -> Lights {
+        Lights::build(emitters, geoms, &|_| None, strategy)
+    }
+
+    fn build(
+        emitters: Vec<Emitter>,
+        geoms: &[Geometry],
+        motion: &dyn Fn(ShapeId) -> Option<Motion>,
+        strategy: Strategy,
+    ) -> Lights {
         let mut lights = Lights {
             emitters: Vec::new(),
             items: Vec::new(),
@@ -148,10 +168,11 @@ impl Lights {
             infinite: Vec::new(),
             surfaces: vec![None; geoms.len()],
             item_of: Vec::new(),
+            motions: Vec::new(),
         };
         let mut bounds = Vec::new();
         for (id, emitter) in emitters.iter().enumerate() {
-            lights.add(id as u32, emitter, geoms, &mut bounds);
+            lights.add(id as u32, emitter, geoms, motion, &mut bounds);
         }
         lights.emitters = emitters;
         let tree = match strategy {
@@ -174,6 +195,7 @@ impl Lights {
         id: u32,
         emitter: &Emitter,
         geoms: &[Geometry],
+        motion: &dyn Fn(ShapeId) -> Option<Motion>,
         bounds: &mut Vec<LightBounds>,
     ) {
         match *emitter {
@@ -181,7 +203,11 @@ impl Lights {
             Emitter::Image(ref map) if map.integral() > 0.0 => self.infinite.push(id),
             Emitter::Point { p, intensity } if !intensity.is_black() => {
                 let what = What::Point { p, intensity };
-                self.items.push(Item { emitter: id, what });
+                self.items.push(Item {
+                    emitter: id,
+                    what,
+                    motion: None,
+                });
                 bounds.push(LightBounds {
                     bounds: Aabb { min: p, max: p },
                     axis: Vec3::Z,
@@ -195,6 +221,14 @@ impl Lights {
                 };
                 let first = self.item_of.len() as u32;
                 self.surfaces[shape.0 as usize] = Some(Surface { radiance, first });
+                let motion = motion(shape).map(|motion| {
+                    self.motions.push(motion);
+                    self.motions.len() as u32 - 1
+                });
+                if let Geometry::Deforming(_) = g {
+                    let prims = g.prim_count() as usize;
+                    self.item_of.extend(std::iter::repeat_n(NO_ITEM, prims));
+                }
                 for part in local::parts_of(shape, g) {
                     let area = part.area(g);
                     let item = if area > 0.0 {
@@ -205,14 +239,22 @@ impl Lights {
                     self.item_of.extend(part.prims().map(|_| item));
                     if area > 0.0 {
                         let what = What::Part { part, radiance };
-                        self.items.push(Item { emitter: id, what });
+                        self.items.push(Item {
+                            emitter: id,
+                            what,
+                            motion,
+                        });
                         let (b, axis, cos_spread) = part.bounds(g);
                         let power = PI as f64 * area * radiance.luminance() as f64;
-                        bounds.push(LightBounds {
+                        let local = LightBounds {
                             bounds: b,
                             axis,
                             cos_spread,
                             power: power.min(f32::MAX as f64) as f32,
+                        };
+                        bounds.push(match motion {
+                            Some(m) => moving::bounds(&self.motions[m as usize], local),
+                            None => local,
                         });
                     }
                 }
@@ -363,7 +405,11 @@ impl Lights {
         let prob = prob * share;
         match item.what {
             What::Part { part, radiance } => {
-                let s = part.sample(geoms.get(part.shape().0 as usize)?, from.p, u)?;
+                let g = geoms.get(part.shape().0 as usize)?;
+                let s = match item.motion {
+                    None => part.sample(g, from.p, u),
+                    Some(m) => moving::sample(&part, g, self.motions.get(m as usize)?, from, u),
+                }?;
                 let pdf = s.pdf * prob;
                 (pdf > 0.0).then_some(EmitterSample {
                     wi: s.wi,
@@ -423,14 +469,17 @@ impl Lights {
         let Some(&index) = index.filter(|&&i| i != NO_ITEM) else {
             return 0.0;
         };
-        let (What::Part { part, .. }, Some(g)) = (
-            self.items[index as usize].what,
-            geoms.get(met.shape.0 as usize),
-        ) else {
+        let item = &self.items[index as usize];
+        let (What::Part { part, .. }, Some(g)) = (item.what, geoms.get(met.shape.0 as usize))
+        else {
             return 0.0;
         };
         let prob = self.choice_prob(from, index as usize);
-        prob * self.local_share() * part.pdf(g, from.p, met.p, met.ng)
+        let pdf = match item.motion.and_then(|m| self.motions.get(m as usize)) {
+            None => part.pdf(g, from.p, met.p, met.ng),
+            Some(motion) => moving::pdf(&part, g, motion, from, met),
+        };
+        prob * self.local_share() * pdf
     }
 
     /// Probability that [`Lights::choose`] gives `index`.

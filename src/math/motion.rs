@@ -125,6 +125,17 @@ impl Motion {
         }
     }
 
+    /// Whether all directions stay as they are over time: nothing turns and nothing is stretched.
+    pub fn only_translates(&self) -> bool {
+        match &self.0 {
+            Kind::Still(_) => true,
+            Kind::Moving(m) => {
+                let constant = |s: &Segment| matches!(s.linear, Linear::Constant { .. });
+                m.segments.iter().all(constant)
+            }
+        }
+    }
+
     /// The map at a time in [0,1].
     #[inline]
     pub fn at(&self, time: f32) -> Transform {

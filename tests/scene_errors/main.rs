@@ -6,6 +6,7 @@ mod files;
 mod language;
 mod outside;
 mod values;
+mod world;
 
 use luxel::format::{self, Category, Overrides, SceneDesc, SceneError};
 use std::fs;

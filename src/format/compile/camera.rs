@@ -4,18 +4,18 @@ use super::{MAX_COORDINATE, out_of_reach, shapes, within_reach};
 use crate::film::{FilmSpec, Filter};
 use crate::format::plugins::Category;
 use crate::format::{Props, SceneError};
-use crate::geom::Geometry;
-use crate::math::{Aabb, DVec3, Motion, Transform};
+use crate::geom::{Geometry, ShapeId, World};
+use crate::math::{DVec3, Motion, Transform};
 use crate::scene::Plan;
 use crate::scene::camera::{
     Aperture, Camera, Distant, FovAxis, IrradianceMeter, Lens, Orthographic, OrthographicSpec,
     Perspective, PerspectiveSpec, Surface, Target, View,
 };
 
-/// A sensor and the number of the shape that it stands in.
+/// A sensor and the shape that it stands in.
 pub struct Sensor<'a> {
     pub props: Props<'a>,
-    pub shape: Option<usize>,
+    pub shape: Option<Props<'a>>,
 }
 
 /// The first sensor of the scene, be it in a shape or beside them.
@@ -26,11 +26,11 @@ pub fn the_sensor<'a>(
 ) -> Result<Sensor<'a>, SceneError> {
     let beside = root.children(Category::Sensor).into_iter();
     let mut sensors: Vec<_> = beside.map(|props| Sensor { props, shape: None }).collect();
-    for (i, shape) in shapes.iter().enumerate() {
+    for shape in shapes {
         let inside = shape.children(Category::Sensor).into_iter();
         sensors.extend(inside.map(|props| Sensor {
             props,
-            shape: Some(i),
+            shape: Some(*shape),
         }));
     }
     // In the order of the file.
@@ -73,25 +73,26 @@ pub fn shutter(sensor: &Props) -> Result<[f64; 2], SceneError> {
     Ok([open, close])
 }
 
-/// The camera of `sensor`, with the shapes of the scene as placed relative to `center`. A meter turns the
+/// The camera of `sensor`, with the world as placed relative to `center` and the shape there that the sensor
+/// stands in. A meter turns the
 /// film's filter into a box, so that all its rays count the same.
 pub fn camera(
     sensor: &Sensor,
     shutter: [f64; 2],
     film: &mut FilmSpec,
-    shapes: &[Geometry],
+    (world, measured): (&World, Option<ShapeId>),
     center: DVec3,
 ) -> Result<Camera, SceneError> {
     let p = &sensor.props;
-    let camera = match (p.plugin(), sensor.shape) {
+    let camera = match (p.plugin(), measured) {
         ("irradiancemeter", Some(shape)) => {
-            let surface = surface(p, shapes[shape].clone())?;
+            let surface = surface(p, world.geometries()[shape.0 as usize].clone())?;
             Camera::irradiance_meter(IrradianceMeter::new(surface))
         }
         ("radiancemeter", _) => Camera::radiance_meter(radiance_meter(p, shutter, center)?),
         ("distant", _) => {
             let view = View::new(&directed(p, shutter, DVec3::ZERO)?, DVec3::ZERO);
-            Camera::distant(view, distant(p, shapes, center)?)
+            Camera::distant(view, distant(p, world, center)?)
         }
         ("orthographic", _) => {
             let spec = orthographic(p)?;
@@ -319,11 +320,8 @@ fn directed(sensor: &Props, shutter: [f64; 2], origin: DVec3) -> Result<Motion, 
     }
 }
 
-fn distant(sensor: &Props, shapes: &[Geometry], center: DVec3) -> Result<Distant, SceneError> {
-    let bounds = shapes
-        .iter()
-        .map(Geometry::bounds)
-        .fold(Aabb::EMPTY, Aabb::union);
+fn distant(sensor: &Props, world: &World, center: DVec3) -> Result<Distant, SceneError> {
+    let bounds = world.bounds();
     let (middle, radius) = match bounds.is_empty() {
         true => Default::default(),
         false => (bounds.center(), 0.5 * bounds.diagonal().length()),

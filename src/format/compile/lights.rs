@@ -30,6 +30,11 @@ pub fn lights(
                     .error(what)
                     .with_help("use \"area\", or put the emitter beside the shape"));
             }
+            if shape.is_given("filename_end") {
+                let what = "a mesh that changes its form cannot be an emitter";
+                let help = "leave filename_end out, or move the shape as a whole by an <animation>";
+                return Err(emitter.error(what).with_help(help));
+            }
             ignore_weight(&emitter);
             used.insert(emitter.object_id());
             let radiance = match emitter.rgb_or_texture("radiance")? {

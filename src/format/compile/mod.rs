@@ -7,8 +7,7 @@ mod integrator;
 mod lights;
 mod materials;
 mod shapes;
-
-use rayon::prelude::*;
+mod world;
 
 use super::error::command_line;
 use super::plugins::Category;
@@ -19,6 +18,7 @@ use crate::render::{AovLayer, Job};
 use crate::scene::{Plan, Scene};
 use crate::transport::aov::Aov;
 use materials::Materials;
+use world::Layout;
 
 /// What the command line asks for in place of what the scene says.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -58,8 +58,7 @@ pub fn compile(desc: &SceneDesc, overrides: &Overrides) -> Result<Compiled, Scen
     let root = desc.scene();
     let mut plan = Plan::default();
     let mut warnings = Vec::new();
-    let shape_props = root.children(Category::Shape);
-    let sensor = camera::the_sensor(&root, &shape_props, &mut warnings)?;
+    let sensor = camera::the_sensor(&root, &root.children(Category::Shape), &mut warnings)?;
     let shutter = camera::shutter(&sensor.props)?;
     let mut film = film::film(&sensor.props, overrides)?;
     let sampler = film::sampler(&sensor.props, overrides, &mut plan)?;
@@ -71,8 +70,10 @@ pub fn compile(desc: &SceneDesc, overrides: &Overrides) -> Result<Compiled, Scen
         });
     }
 
-    let sources: Result<Vec<_>, SceneError> = shape_props.par_iter().map(shapes::read).collect();
-    let (shapes, center) = shapes::place(sources?, &mut plan)?;
+    let layout = Layout::new(&root, shutter, &mut warnings)?;
+    let (world, center) = layout.build(&mut plan)?;
+    let measured = layout.measured(&sensor)?;
+    let shape_props = layout.shapes;
     let mut materials = Materials::new(desc);
     let mut surfaces = Vec::with_capacity(shape_props.len());
     for props in &shape_props {
@@ -82,13 +83,13 @@ pub fn compile(desc: &SceneDesc, overrides: &Overrides) -> Result<Compiled, Scen
     if lights.is_empty() {
         warnings.push("the scene has no emitter, so the picture is black".to_string());
     }
-    let camera = camera::camera(&sensor, shutter, &mut film.spec, &shapes, center)?;
-    camera::plan(&camera, camera.moves(), shutter, &mut plan);
+    let camera = camera::camera(&sensor, shutter, &mut film.spec, (&world, measured), center)?;
+    camera::plan(&camera, camera.moves() || world.moves(), shutter, &mut plan);
     let materials = materials.finish(&mut plan, &mut warnings);
     desc.check_all_read()?;
     Ok(Compiled {
         job: Job {
-            scene: Scene::new(shapes, surfaces, materials, lights, center, plan),
+            scene: Scene::with_world(world, surfaces, materials, lights, center, plan),
             camera,
             film: film.spec,
             sampler: sampler.kind,

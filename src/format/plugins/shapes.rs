@@ -1,14 +1,19 @@
 //! Shapes.
 
-use super::{Category, Param, Plugin, Range, Slot};
+use super::{Category, Kind, Param, Plugin, Range, Slot};
 
 const FLIP: Param = Param::bool("flip_normals", false, "Turn the normals to the other side.");
-const TO_WORLD: Param = Param::transform("to_world", "Places the shape in the world.");
+const TO_WORLD: Param = Param::motion("to_world", "Places the shape in the world.");
 const SILHOUETTE: Param = Param::float(
     "silhouette_sampling_weight",
     Range::NonNegative,
     1.0,
     "For differentiable rendering; without effect here.",
+);
+const END: Param = Param::optional(
+    "filename_end",
+    Kind::File,
+    "The same mesh with its vertices where they are when the shutter closes; they move on straight lines.",
 );
 const FACE: Param = Param::bool(
     "face_normals",
@@ -33,6 +38,7 @@ pub const PLUGINS: &[Plugin] = &[
         "obj",
         &[
             Param::file("filename", "The Wavefront OBJ file."),
+            END,
             FACE,
             Param::bool(
                 "flip_tex_coords",
@@ -49,6 +55,7 @@ pub const PLUGINS: &[Plugin] = &[
         "ply",
         &[
             Param::file("filename", "The PLY file, ASCII or binary."),
+            END,
             FACE,
             Param::bool(
                 "flip_tex_coords",
@@ -99,4 +106,25 @@ pub const PLUGINS: &[Plugin] = &[
         ],
         "Cylinder without caps, with normals outwards.",
     ),
+    Plugin {
+        slots: &[Slot::new(Category::Shape, 0, usize::MAX)],
+        ..Plugin::new(
+            Category::Shape,
+            "shapegroup",
+            &[],
+            "Shapes that are not there by themselves, but wherever an instance places them.",
+        )
+    },
+    Plugin {
+        slots: &[Slot::new(Category::Shape, 1, 1)],
+        ..Plugin::new(
+            Category::Shape,
+            "instance",
+            &[
+                Param::motion("to_world", "Places the group in the world."),
+                SILHOUETTE,
+            ],
+            "The shapes of a shapegroup, in one more place.",
+        )
+    },
 ];

@@ -30,11 +30,6 @@ const TABLE: &[(Category, &[&str], &str)] = &[
         MESH,
     ),
     (
-        Shape,
-        &["shapegroup", "instance"],
-        "write the shape out at each place where it stands",
-    ),
-    (
         Bsdf,
         &[
             "roughdielectric",
