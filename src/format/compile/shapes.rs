@@ -104,9 +104,10 @@ fn along_axis(props: &Props) -> Result<Transform, SceneError> {
 /// A mesh from a file, its positions and normals taken to the world.
 fn mesh(props: &Props, to_world: &Transform) -> Result<Kind, SceneError> {
     let path = props.file("filename")?;
-    let flip_v = props.bool("flip_tex_coords")?;
     let face_normals = props.bool("face_normals")?;
+    let flip_v = props.plugin() != "serialized" && props.bool("flip_tex_coords")?;
     let data = match props.plugin() {
+        "serialized" => mesh_io::read_serialized(path, props.int("shape_index")? as usize),
         "ply" => mesh_io::read_ply(path),
         _ => mesh_io::read_obj(path),
     };

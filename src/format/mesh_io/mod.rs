@@ -1,4 +1,4 @@
-//! Readers of mesh files: Wavefront OBJ and PLY, into plain arrays.
+//! Readers of mesh files: Wavefront OBJ, PLY and Mitsuba's serialized meshes, into plain arrays.
 //!
 //! Positions stay in f64, since the scene is moved to its centre only later. What is wrong with a
 //! file is told with its name and, for text, its line. Nothing is allocated on the word of a header
@@ -7,6 +7,7 @@
 mod obj;
 mod ply;
 mod ply_header;
+mod serialized;
 
 use super::limits;
 use crate::math::{DVec3, Vec2, Vec3};
@@ -59,6 +60,11 @@ pub fn read_obj(path: &Path) -> Result<MeshData, MeshError> {
 /// Reads a PLY file, ASCII or binary of either byte order.
 pub fn read_ply(path: &Path) -> Result<MeshData, MeshError> {
     read_with(path, |bytes| ply::parse(&bytes))
+}
+
+/// Reads mesh `index`, from 0, of a file of Mitsuba's serialized meshes, version 3 or 4.
+pub fn read_serialized(path: &Path, index: usize) -> Result<MeshData, MeshError> {
+    read_with(path, |bytes| serialized::parse(&bytes, index))
 }
 
 fn read_with(

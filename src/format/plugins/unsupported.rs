@@ -16,7 +16,6 @@ const TABLE: &[(Category, &[&str], &str)] = &[
     (
         Shape,
         &[
-            "serialized",
             "bsplinecurve",
             "linearcurve",
             "ellipsoids",
