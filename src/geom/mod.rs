@@ -6,11 +6,13 @@
 pub mod accel;
 pub mod analytic;
 pub mod mesh;
+pub mod sdf;
 pub mod wide;
 
 pub use accel::{Accel, Hooks, MeshRef};
 pub use analytic::{Cylinder, Disk, Sphere};
 pub use mesh::{Mesh, MeshError};
+pub use sdf::{Sdf, SdfGrid};
 
 use crate::math::{Aabb, Frame, Vec2, Vec3, fp, warp};
 
@@ -145,6 +147,8 @@ pub enum Geometry {
     Sphere(Sphere),
     Disk(Disk),
     Cylinder(Cylinder),
+    /// Gives no light: it has no area to sample.
+    Sdf(Sdf),
 }
 
 impl Geometry {
@@ -154,15 +158,18 @@ impl Geometry {
             Geometry::Sphere(s) => s.bounds(),
             Geometry::Disk(s) => s.bounds(),
             Geometry::Cylinder(s) => s.bounds(),
+            Geometry::Sdf(s) => s.bounds(),
         }
     }
 
+    /// Area, 0 for a grid of distances.
     pub fn area(&self) -> f64 {
         match self {
             Geometry::Mesh(s) => s.area(),
             Geometry::Sphere(s) => s.area(),
             Geometry::Disk(s) => s.area(),
             Geometry::Cylinder(s) => s.area(),
+            Geometry::Sdf(_) => 0.0,
         }
     }
 
@@ -191,6 +198,7 @@ impl Geometry {
             Geometry::Sphere(s) => s.intersect(ray, t_max),
             Geometry::Disk(s) => s.intersect(ray, t_max),
             Geometry::Cylinder(s) => s.intersect(ray, t_max),
+            Geometry::Sdf(s) => s.intersect(ray, t_max),
         }
     }
 
@@ -203,6 +211,7 @@ impl Geometry {
             Geometry::Sphere(s) => s.at_hit(ray, raw.t),
             Geometry::Disk(s) => s.at_hit(ray),
             Geometry::Cylinder(s) => s.at_hit(ray, raw.t),
+            Geometry::Sdf(s) => return s.hit(ray, raw),
         };
         Hit {
             p: point.p.as_vec3(),
@@ -225,6 +234,7 @@ impl Geometry {
             Geometry::Sphere(s) => s.at_point(hit.p),
             Geometry::Disk(s) => s.at_point(hit.p),
             Geometry::Cylinder(s) => s.at_point(hit.p),
+            Geometry::Sdf(_) => return (Vec3::ZERO, Vec3::ZERO),
         };
         (point.dp_du.as_vec3(), point.dp_dv.as_vec3())
     }
@@ -236,6 +246,7 @@ impl Geometry {
             Geometry::Sphere(s) => s.sample_area(u),
             Geometry::Disk(s) => s.sample_area(u),
             Geometry::Cylinder(s) => s.sample_area(u),
+            Geometry::Sdf(s) => s.no_sample(),
         }
     }
 }

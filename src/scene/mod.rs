@@ -257,7 +257,7 @@ fn plan_of_scene(plan: &mut Plan, lights: &Lights, has_analytic: bool, emitters_
         true => plan.add(
             "shapes",
             "triangles and exact shapes in one tree",
-            "there are spheres, disks or cylinders",
+            "there are spheres, disks, cylinders or grids of distances",
         ),
         false => plan.add("shapes", "triangles only", "no shape is anything else"),
     }

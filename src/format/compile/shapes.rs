@@ -1,11 +1,14 @@
 //! Shapes: files are read and placed in the world in f64; only when the centre of the scene is known are
 //! coordinates rounded, relative to it.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
 use crate::format::mesh_io::{self, MeshData};
+use crate::format::plugins::Category;
 use crate::format::{Props, SceneError};
-use crate::geom::{Cylinder, Disk, Geometry, Mesh, Sphere};
+use crate::geom::{Cylinder, Disk, Geometry, Mesh, Sdf, SdfGrid, Sphere};
 use crate::math::{DVec3, Transform, Vec3};
 use crate::scene::Plan;
 
@@ -30,6 +33,10 @@ enum Kind {
     Sphere,
     Disk,
     Cylinder,
+    Sdf {
+        grid: Arc<SdfGrid>,
+        smooth: bool,
+    },
 }
 
 /// Reads one shape, its file included.
@@ -57,13 +64,15 @@ pub fn read<'a>(props: &Props<'a>) -> Result<Source<'a>, SceneError> {
             to_world = to_world * along_axis(props)?;
             Kind::Cylinder
         }
+        "sdfgrid" => sdf(props)?,
         _ => mesh(props, &to_world)?,
     };
     Ok(Source {
         props: *props,
         kind,
         to_world,
-        flip_normals: props.bool("flip_normals")?,
+        // The sign of its distances says where a grid has its outside.
+        flip_normals: props.plugin() != "sdfgrid" && props.bool("flip_normals")?,
     })
 }
 
@@ -99,6 +108,22 @@ fn along_axis(props: &Props) -> Result<Transform, SceneError> {
     ];
     Transform::from_rows(rows)
         .ok_or_else(|| props.error_at("radius", "the radius is too small for the length"))
+}
+
+/// A grid of distances from a file.
+fn sdf(props: &Props) -> Result<Kind, SceneError> {
+    if let Some(emitter) = props.child(Category::Emitter) {
+        let error = emitter.error("a \"sdfgrid\" cannot be an emitter");
+        return Err(error.with_help("use a mesh of the shape"));
+    }
+    let wrong = |what: String| props.error_at("filename", what);
+    let path = props.file("filename")?;
+    let data = mesh_io::read_grid(path).map_err(|e| wrong(e.to_string()))?;
+    let grid = SdfGrid::new(data.size, data.values);
+    Ok(Kind::Sdf {
+        grid: Arc::new(grid.map_err(|what| wrong(format!("{}: {what}", path.display())))?),
+        smooth: props.choice("normals")? == "smooth",
+    })
 }
 
 /// A mesh from a file, its positions and normals taken to the world.
@@ -239,6 +264,7 @@ fn geometry(source: Source, center: DVec3) -> Result<Geometry, SceneError> {
         Kind::Sphere => Geometry::Sphere(Sphere::new(to_scene, flip_normals).ok_or_else(|| {
             refused("the transform makes the sphere an ellipsoid, which is not supported")
         })?),
+        Kind::Sdf { grid, smooth } => Geometry::Sdf(Sdf::new(grid, to_scene, smooth)),
         Kind::Disk => Geometry::Disk(Disk::new(to_scene, flip_normals)),
         Kind::Cylinder => {
             Geometry::Cylinder(Cylinder::new(to_scene, flip_normals).ok_or_else(|| {

@@ -1,4 +1,5 @@
-//! Readers of mesh files: Wavefront OBJ, PLY and Mitsuba's serialized meshes, into plain arrays.
+//! Readers of mesh files: Wavefront OBJ, PLY and Mitsuba's serialized meshes, into plain arrays;
+//! and of the grids that stand for a shape.
 //!
 //! Positions stay in f64, since the scene is moved to its centre only later. What is wrong with a
 //! file is told with its name and, for text, its line. Nothing is allocated on the word of a header
@@ -8,6 +9,9 @@ mod obj;
 mod ply;
 mod ply_header;
 mod serialized;
+mod vol;
+
+pub use vol::GridData;
 
 use super::limits;
 use crate::math::{DVec3, Vec2, Vec3};
@@ -67,19 +71,30 @@ pub fn read_serialized(path: &Path, index: usize) -> Result<MeshData, MeshError>
     read_with(path, |bytes| serialized::parse(&bytes, index))
 }
 
-fn read_with(
-    path: &Path,
-    parse: impl FnOnce(Vec<u8>) -> Result<MeshData, Wrong>,
-) -> Result<MeshData, MeshError> {
-    let error = |line, what| MeshError {
+/// Reads a grid of numbers from a volume file of Mitsuba (`.vol`): one channel of 32-bit floats.
+pub fn read_grid(path: &Path) -> Result<GridData, MeshError> {
+    let error = |(line, what)| MeshError {
         file: path.to_path_buf(),
         line,
         what,
     };
-    let bytes = read_bytes(path).map_err(|what| error(None, what))?;
-    let mesh = parse(bytes).map_err(|(line, what)| error(line, what))?;
+    let bytes = read_bytes(path).map_err(|what| error((None, what)))?;
+    vol::parse(&bytes).map_err(error)
+}
+
+fn read_with(
+    path: &Path,
+    parse: impl FnOnce(Vec<u8>) -> Result<MeshData, Wrong>,
+) -> Result<MeshData, MeshError> {
+    let error = |(line, what)| MeshError {
+        file: path.to_path_buf(),
+        line,
+        what,
+    };
+    let bytes = read_bytes(path).map_err(|what| error((None, what)))?;
+    let mesh = parse(bytes).map_err(error)?;
     if mesh.indices.is_empty() {
-        return Err(error(None, "the mesh has no triangles".into()));
+        return Err(error((None, "the mesh has no triangles".into())));
     }
     Ok(mesh)
 }

@@ -78,6 +78,21 @@ pub const PLUGINS: &[Plugin] = &[
         "Triangle mesh of a file made by Mitsuba; smooth normals are computed if it has none.",
     ),
     shape(
+        "sdfgrid",
+        &[
+            Param::file("filename", "The grid of signed distances, a .vol file."),
+            Param::choice(
+                "normals",
+                &["smooth", "analytic"],
+                "smooth",
+                "Shade with normals that are smoothed between voxels, or with the exact ones.",
+            ),
+            TO_WORLD,
+            SILHOUETTE,
+        ],
+        "Where a grid of distances over the cube from (0, 0, 0) to (1, 1, 1) is zero; gives no light.",
+    ),
+    shape(
         "rectangle",
         &[FLIP, FACE, TO_WORLD, SILHOUETTE],
         "The square from (-1, -1, 0) to (1, 1, 0) with normal +z.",

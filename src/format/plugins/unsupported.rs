@@ -20,7 +20,6 @@ const TABLE: &[(Category, &[&str], &str)] = &[
             "linearcurve",
             "ellipsoids",
             "ellipsoidsmesh",
-            "sdfgrid",
             "heightfield",
             "hair",
             "deformable",
