@@ -1,6 +1,7 @@
 //! From the description of a scene to a job that can be rendered: every default settled, every name
 //! turned into an index, the plan made.
 
+mod attributes;
 mod film;
 mod integrator;
 mod lights;
@@ -70,8 +71,9 @@ pub fn compile(desc: &SceneDesc, overrides: &Overrides) -> Result<Compiled, Scen
 
     let shape_props = root.children(Category::Shape);
     let sources: Result<Vec<_>, SceneError> = shape_props.par_iter().map(shapes::read).collect();
-    let (shapes, center) = shapes::place(sources?, &mut plan)?;
-    let mut materials = Materials::new(desc);
+    let mut sources = sources?;
+    let mut materials = Materials::new(desc, shapes::take_attributes(&mut sources));
+    let (shapes, center) = shapes::place(sources, &mut plan)?;
     let mut surfaces = Vec::with_capacity(shape_props.len());
     for props in &shape_props {
         surfaces.push(materials.of_shape(props)?);

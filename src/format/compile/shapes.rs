@@ -12,6 +12,7 @@ use crate::geom::{Cylinder, Disk, Geometry, Mesh, Sdf, SdfGrid, Sphere};
 use crate::math::{DVec3, Transform, Vec3};
 use crate::scene::Plan;
 
+use super::attributes::{self, Attributes};
 use super::{out_of_reach, within_reach};
 
 /// A shape whose place in the world is known but not yet rounded.
@@ -133,7 +134,7 @@ fn mesh(props: &Props, to_world: &Transform) -> Result<Kind, SceneError> {
     let flip_v = props.plugin() != "serialized" && props.bool("flip_tex_coords")?;
     let data = match props.plugin() {
         "serialized" => mesh_io::read_serialized(path, props.int("shape_index")? as usize),
-        "ply" => mesh_io::read_ply(path),
+        "ply" => mesh_io::read_ply(path, &attributes::wanted(props)),
         _ => mesh_io::read_obj(path),
     };
     let mut data = data.map_err(|e| props.error_at("filename", e.to_string()))?;
@@ -158,6 +159,17 @@ fn mesh(props: &Props, to_world: &Transform) -> Result<Kind, SceneError> {
     // flat, since a zero normal leaves the face its own.
     let smooth = !face_normals && data.normals.is_none();
     Ok(Kind::Mesh { data, smooth })
+}
+
+/// Takes out what the meshes carry beside their geometry.
+pub fn take_attributes(sources: &mut [Source]) -> Attributes {
+    let mut all = Attributes::default();
+    for source in sources {
+        if let Kind::Mesh { data, .. } = &mut source.kind {
+            all.take(&source.props, data);
+        }
+    }
+    all
 }
 
 /// Least and greatest coordinates of a shape in the world.

@@ -5,12 +5,14 @@
 //! file is told with its name and, for text, its line. Nothing is allocated on the word of a header
 //! alone: declared counts are held against the bytes that are there.
 
+mod attributes;
 mod obj;
 mod ply;
 mod ply_header;
 mod serialized;
 mod vol;
 
+pub use attributes::Attribute;
 pub use vol::GridData;
 
 use super::limits;
@@ -30,6 +32,10 @@ pub struct MeshData {
     /// Per vertex; (0, 0) for a vertex without, when others have one.
     pub uvs: Option<Vec<Vec2>>,
     pub indices: Vec<[u32; 3]>,
+    /// Those that were asked for: a value per vertex, or per triangle.
+    pub attributes: Vec<Attribute>,
+    /// The names of all that there are.
+    pub attribute_names: Vec<String>,
 }
 
 /// What is wrong with a mesh file.
@@ -61,9 +67,9 @@ pub fn read_obj(path: &Path) -> Result<MeshData, MeshError> {
     read_with(path, |bytes| obj::parse(&bytes))
 }
 
-/// Reads a PLY file, ASCII or binary of either byte order.
-pub fn read_ply(path: &Path) -> Result<MeshData, MeshError> {
-    read_with(path, |bytes| ply::parse(&bytes))
+/// Reads a PLY file, ASCII or binary of either byte order, with the attributes of the names `wanted`.
+pub fn read_ply(path: &Path, wanted: &[String]) -> Result<MeshData, MeshError> {
+    read_with(path, |bytes| ply::parse(&bytes, wanted))
 }
 
 /// Reads mesh `index`, from 0, of a file of Mitsuba's serialized meshes, version 3 or 4.

@@ -107,7 +107,6 @@ const TABLE: &[(Category, &[&str], &str)] = &[
     (
         Texture,
         &[
-            "mesh_attribute",
             "volume",
             "vertexcolors",
             "scale",
