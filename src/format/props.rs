@@ -322,6 +322,12 @@ impl<'a> Props<'a> {
         }
     }
 
+    /// Every nested object, textures that are values of parameters too. Reads none of them.
+    pub(super) fn all_children(&self) -> impl Iterator<Item = Props<'a>> {
+        let (desc, object) = (self.desc, self.object());
+        object.children.iter().map(|c| Props { desc, id: c.object })
+    }
+
     /// Nested objects and references of a category, in file order, with the names given to them.
     /// Textures that are the value of a parameter are not among them.
     pub fn named_children(&self, category: Category) -> Vec<(Option<&'a str>, Props<'a>)> {

@@ -20,6 +20,7 @@ pub fn lights(
     let mut emitters = Vec::new();
     let mut used = HashSet::new();
     for (i, shape) in shapes.iter().enumerate() {
+        materials.enter(Some(shape));
         for emitter in shape.children(Category::Emitter) {
             if emitter.plugin() != "area" {
                 let what = format!(
@@ -54,6 +55,7 @@ pub fn lights(
             });
         }
     }
+    materials.enter(None);
     let mut environment: Option<Props> = None;
     for emitter in root.children(Category::Emitter) {
         if emitter.plugin() == "area" {

@@ -38,6 +38,7 @@ impl<'a> Materials<'a> {
                 }
                 Texture::Bitmap(bitmap)
             }
+            Texture::MeshAttribute(a) => Texture::MeshAttribute(self.share(p, name, a)),
             other => other,
         })
     }
@@ -45,7 +46,11 @@ impl<'a> Materials<'a> {
     pub(super) fn scalar(&mut self, p: &Props<'a>, name: &str) -> Result<Texture, SceneError> {
         match p.float_or_texture(name)? {
             FloatOrTexture::Float(v) => Ok(Texture::Constant(Rgb::splat(v as f32))),
-            FloatOrTexture::Texture(id) => self.texture(id),
+            FloatOrTexture::Texture(id) => {
+                let texture = self.texture(id)?;
+                self.check_scalar(id)?;
+                Ok(texture)
+            }
         }
     }
 
@@ -61,7 +66,11 @@ impl<'a> Materials<'a> {
             return Ok(texture.clone());
         }
         let p = self.desc.object(id);
+        if p.plugin() == "mesh_attribute" {
+            return self.mesh_attribute(&p);
+        }
         let to_uv = affine2(&p.transform("to_uv")?);
+        let outer = std::mem::take(&mut self.per_shape);
         let texture = match p.plugin() {
             "checkerboard" => Texture::Checkerboard(Box::new(Checkerboard {
                 color0: self.reflectance(&p, "color0")?,
@@ -71,7 +80,10 @@ impl<'a> Materials<'a> {
             _ => self.bitmap(&p, to_uv)?,
         };
         let texture = texture.folded();
-        self.textures.insert(id, texture.clone());
+        if !self.per_shape {
+            self.textures.insert(id, texture.clone());
+        }
+        self.per_shape |= outer;
         Ok(texture)
     }
 
