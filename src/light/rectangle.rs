@@ -118,16 +118,32 @@ impl Rectangle {
         ]
     }
 
-    /// Normal of the side that shines.
-    #[cfg(test)]
-    fn shining_normal(&self) -> Vec3 {
-        if self.front { self.ng } else { -self.ng }
-    }
-
     /// Whether a receiver at `eye` is on the side that shines.
     #[inline]
     fn shines_on(&self, eye: Vec3) -> bool {
         ((eye - self.corner).dot(self.ng) > 0.0) == self.front
+    }
+
+    /// Whether [`Rectangle::sample`] is uniform over the area for a receiver at `eye`.
+    pub fn is_by_area(&self, eye: Vec3) -> bool {
+        self.seen(eye).is_none()
+    }
+
+    /// The point at the parameters `st` in [0,1]².
+    pub fn at(&self, st: Vec2) -> Vec3 {
+        self.corner + self.x * (self.width * st.x) + self.y * (self.height * st.y)
+    }
+
+    /// The parameters of the point `p` of the rectangle.
+    pub fn locate(&self, p: Vec3) -> Vec2 {
+        let d = p - self.corner;
+        Vec2::new(d.dot(self.x) / self.width, d.dot(self.y) / self.height)
+    }
+
+    /// Normal of the side that shines.
+    #[cfg(test)]
+    fn shining_normal(&self) -> Vec3 {
+        if self.front { self.ng } else { -self.ng }
     }
 
     /// How it looks from `eye`, where that is worth sampling by solid angle.

@@ -16,6 +16,21 @@ pub enum FovAxis {
     Larger,
 }
 
+impl FovAxis {
+    /// Half the width, at unit depth, of a picture of `width` by `height` that `fov_deg` spans along this.
+    pub fn half_width(self, fov_deg: f64, width: f64, height: f64) -> f64 {
+        let (w, h) = (width, height);
+        (0.5 * fov_deg.to_radians()).tan()
+            * match self {
+                FovAxis::X => 1.0,
+                FovAxis::Y => w / h,
+                FovAxis::Diagonal => w / w.hypot(h),
+                FovAxis::Smaller => (w / h).max(1.0),
+                FovAxis::Larger => (w / h).min(1.0),
+            }
+    }
+}
+
 /// What makes a perspective camera; distances in scene units.
 #[derive(Clone, Copy, Debug)]
 pub struct PerspectiveSpec {
@@ -46,16 +61,7 @@ impl Camera {
     /// `center` is the point of the world that the scene's coordinates are relative to.
     pub fn perspective(spec: &PerspectiveSpec, film: &FilmSpec, center: DVec3) -> Camera {
         let (w, h) = (f64::from(film.width), f64::from(film.height));
-        let tan = (0.5 * spec.fov_deg.to_radians()).tan();
-        // Half the width of the picture at unit depth.
-        let half_width = tan
-            * match spec.fov_axis {
-                FovAxis::X => 1.0,
-                FovAxis::Y => w / h,
-                FovAxis::Diagonal => w / w.hypot(h),
-                FovAxis::Smaller => (w / h).max(1.0),
-                FovAxis::Larger => (w / h).min(1.0),
-            };
+        let half_width = spec.fov_axis.half_width(spec.fov_deg, w, h);
         // x = half_width (1 - 2 (px / w + offset)), likewise y with half_width h / w.
         let [ox, oy] = spec.principal_point_offset;
         let half_height = half_width * h / w;

@@ -7,7 +7,7 @@ pub use camera::{Camera, FovAxis, PerspectiveSpec};
 pub use plan::{Plan, PlanEntry};
 
 use crate::geom::{Accel, Geometry, Hit, Hooks, MeshRef, Ray, ShapeId};
-use crate::light::{Emitter, EmitterSample, Lights};
+use crate::light::{Emitter, EmitterSample, Lights, Strategy};
 use crate::material::{Material, Shading};
 use crate::math::{DVec3, Rgb, Vec2, Vec3};
 
@@ -99,7 +99,7 @@ impl Scene {
             .collect();
         let accel = Accel::build(&meshes, &others);
         let has_analytic = !others.is_empty();
-        let emitters_can_be_met = emitters.iter().any(|e| !matches!(e, Emitter::Point { .. }));
+        let emitters_can_be_met = emitters.iter().any(Emitter::can_be_met);
         let tangents = materials.iter().any(Material::is_anisotropic);
         match tangents {
             true => plan.add(
@@ -197,6 +197,13 @@ impl Scene {
         self.lights.pdf_escaped(from, d)
     }
 
+    /// Chooses among the lights by `strategy` from now on: for comparisons, since the one that is chosen by
+    /// itself is meant to be the best.
+    pub fn choose_lights_by(&mut self, strategy: Strategy) {
+        let emitters = self.lights.emitters().to_vec();
+        self.lights = Lights::with_strategy(emitters, &self.geometries, strategy);
+    }
+
     pub fn is_emitter(&self, shape: ShapeId) -> bool {
         self.lights.is_emitter(shape)
     }
@@ -264,7 +271,7 @@ fn plan_of_scene(plan: &mut Plan, lights: &Lights, has_analytic: bool, emitters_
     let (decision, reason) = lights.choice();
     plan.add("light choice", decision, reason);
     if !lights.is_empty() && !emitters_can_be_met {
-        let reason = "every light is a point, which no ray can meet";
+        let reason = "every light is a point or a beam, which no ray can meet";
         plan.add("last bounce", "no ray to meet an emitter", reason);
     }
 }

@@ -247,22 +247,7 @@ pub fn camera(sensor: &Props, film: &FilmSpec, center: DVec3) -> Result<Camera, 
     }
     // A pinhole is sharp at every distance.
     sensor.ignore(&["focus_distance"]);
-    let (fov_deg, fov_axis) = match sensor.opt_float("fov")? {
-        Some(fov) => {
-            let axis = match sensor.choice("fov_axis")? {
-                "y" => FovAxis::Y,
-                "diagonal" => FovAxis::Diagonal,
-                "smaller" => FovAxis::Smaller,
-                "larger" => FovAxis::Larger,
-                _ => FovAxis::X,
-            };
-            (fov, axis)
-        }
-        None => {
-            sensor.ignore(&["fov_axis"]);
-            (fov_of_focal_length(sensor)?, FovAxis::Diagonal)
-        }
-    };
+    let (fov_deg, fov_axis) = field_of_view(sensor)?;
     let principal_point_offset = [
         sensor.float("principal_point_offset_x")?,
         sensor.float("principal_point_offset_y")?,
@@ -276,6 +261,22 @@ pub fn camera(sensor: &Props, film: &FilmSpec, center: DVec3) -> Result<Camera, 
         far_clip: far,
     };
     Ok(Camera::perspective(&spec, film, center))
+}
+
+/// The field of view in degrees and what it is measured along.
+pub(super) fn field_of_view(p: &Props) -> Result<(f64, FovAxis), SceneError> {
+    let Some(fov) = p.opt_float("fov")? else {
+        p.ignore(&["fov_axis"]);
+        return Ok((fov_of_focal_length(p)?, FovAxis::Diagonal));
+    };
+    let axis = match p.choice("fov_axis")? {
+        "y" => FovAxis::Y,
+        "diagonal" => FovAxis::Diagonal,
+        "smaller" => FovAxis::Smaller,
+        "larger" => FovAxis::Larger,
+        _ => FovAxis::X,
+    };
+    Ok((fov, axis))
 }
 
 /// Diagonal field of view, in degrees, of a lens on 35 mm film (36 x 24 mm).

@@ -79,10 +79,6 @@ const TABLE: &[(Category, &[&str], &str)] = &[
     (
         Emitter,
         &[
-            "spot",
-            "directional",
-            "directionalarea",
-            "projector",
             "collimated",
             "sun",
             "sky",
@@ -90,7 +86,7 @@ const TABLE: &[(Category, &[&str], &str)] = &[
             "volumelight",
             "timed_sunsky",
         ],
-        "use an area light, a point light or an environment map",
+        "use a directional light, an area light or an environment map",
     ),
     (
         Texture,
