@@ -213,7 +213,9 @@ impl Rectangle {
             Some(seen) => 1.0 / seen.solid_angle,
             None => self.pdf_by_area(d, dist),
         };
-        (pdf > 0.0 && pdf < f32::MAX).then_some(RectangleSample { p, wi, dist, pdf })
+        // A receiver within rounding of the plane may be given its own point.
+        let sound = dist > 0.0 && pdf > 0.0 && pdf < f32::MAX;
+        sound.then_some(RectangleSample { p, wi, dist, pdf })
     }
 
     /// Density per steradian at `eye` with which [`Rectangle::sample`] returns its point `p`.
@@ -355,6 +357,22 @@ mod tests {
                         s.pdf
                     );
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn receivers_on_the_rectangle_get_no_nan() {
+        let r = rectangle(2.4, 1.4);
+        for i in 0..64 {
+            let place = Vec2::new((i % 8) as f32 / 8.0 + 0.05, (i / 8) as f32 / 8.0 + 0.05);
+            let eye = r.at(place);
+            let samples = (0..64).filter_map(|k| {
+                let u = Vec2::new((k % 8) as f32 / 8.0 + 0.03, (k / 8) as f32 / 8.0 + 0.01);
+                r.sample(eye, u)
+            });
+            for s in samples {
+                assert!(s.wi.is_finite() && s.dist > 0.0 && s.pdf > 0.0, "{s:?}");
             }
         }
     }

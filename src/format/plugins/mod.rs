@@ -10,6 +10,7 @@ mod cameras;
 mod lights;
 mod reference;
 mod shapes;
+mod spectra;
 mod unsupported;
 
 pub use reference::reference;
@@ -403,6 +404,7 @@ pub fn all() -> impl Iterator<Item = &'static Plugin> {
         shapes::PLUGINS,
         bsdfs::PLUGINS,
         lights::PLUGINS,
+        spectra::PLUGINS,
     ]
     .into_iter()
     .flatten()

@@ -88,20 +88,7 @@ const TABLE: &[(Category, &[&str], &str)] = &[
         ],
         "use a directional light, an area light or an environment map",
     ),
-    (
-        Texture,
-        &[
-            "uniform",
-            "d65",
-            "blackbody",
-            "regular",
-            "irregular",
-            "srgb",
-            "rawconstant",
-            "discrete",
-        ],
-        RGB,
-    ),
+    (Texture, &["rawconstant", "discrete"], RGB),
     (
         Texture,
         &[
