@@ -1,6 +1,7 @@
 //! The full text of each error that a scene can cause.
 
 mod compiling;
+mod emitters;
 mod files;
 mod language;
 mod outside;

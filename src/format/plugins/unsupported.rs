@@ -73,10 +73,6 @@ const TABLE: &[(Category, &[&str], &str)] = &[
     (
         Emitter,
         &[
-            "spot",
-            "directional",
-            "directionalarea",
-            "projector",
             "collimated",
             "sun",
             "sky",
@@ -84,22 +80,9 @@ const TABLE: &[(Category, &[&str], &str)] = &[
             "volumelight",
             "timed_sunsky",
         ],
-        "use an area light, a point light or an environment map",
+        "use a directional light, an area light or an environment map",
     ),
-    (
-        Texture,
-        &[
-            "uniform",
-            "d65",
-            "blackbody",
-            "regular",
-            "irregular",
-            "srgb",
-            "rawconstant",
-            "discrete",
-        ],
-        RGB,
-    ),
+    (Texture, &["rawconstant", "discrete"], RGB),
     (
         Texture,
         &[
