@@ -4,6 +4,7 @@
 use super::desc::{Child, Given, Object, ObjectId, SceneDesc, Value};
 use super::error::{Place, SceneError};
 use super::plugins::{Category, Default, Kind, Param, Plugin, Role};
+use super::spectrum_plugins;
 use crate::bsdf::iors;
 use crate::math::{DVec3, Motion, Rgb, Transform};
 use std::path::Path;
@@ -270,7 +271,8 @@ impl<'a> Props<'a> {
         };
         if let Some(child) = self.named_child(name) {
             child.read.set();
-            return Ok(Some(RgbOrTexture::Texture(child.object)));
+            let value = Props::new(self.desc, child.object);
+            return spectrum_plugins::resolve(&value, role).map(Some);
         }
         let rgb = match (given.map(|g| &g.value), param.default) {
             (Some(value), _) => {
@@ -308,9 +310,16 @@ impl<'a> Props<'a> {
     /// `None` when neither file nor table gives a value.
     pub fn opt_float_or_texture(&self, name: &str) -> Result<Option<FloatOrTexture>, SceneError> {
         let (param, given) = self.lookup(name)?;
-        if let (Kind::FloatTexture(_), Some(child)) = (param.kind, self.named_child(name)) {
+        if let (Kind::FloatTexture(range), Some(child)) = (param.kind, self.named_child(name)) {
             child.read.set();
-            return Ok(Some(FloatOrTexture::Texture(child.object)));
+            let value = Props::new(self.desc, child.object);
+            return match spectrum_plugins::number(&value) {
+                None => Ok(Some(FloatOrTexture::Texture(child.object))),
+                Some(x) => match x? {
+                    x if range.contains(x) => Ok(Some(FloatOrTexture::Float(x))),
+                    _ => Err(self.mistyped(name, &range.to_string())),
+                },
+            };
         }
         match (given.map(|g| &g.value), param.default) {
             (Some(value), _) => float_of(value)

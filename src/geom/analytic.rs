@@ -335,6 +335,12 @@ impl Cylinder {
         self.flip_normals
     }
 
+    /// Centre of the end at v = 0, and from there to the other end.
+    pub fn axis(&self) -> (DVec3, DVec3) {
+        let m = self.to_world.matrix();
+        (m.translation, m.matrix3.z_axis)
+    }
+
     pub fn bounds(&self) -> Aabb {
         let m = self.to_world.matrix();
         let r = circle_extent(m.matrix3.x_axis, m.matrix3.y_axis);

@@ -259,6 +259,16 @@ impl Geometry {
         (point.dp_du.as_vec3(), point.dp_dv.as_vec3())
     }
 
+    /// Texture coordinates at the point `p` of a shape that is no mesh; zero for one.
+    pub fn uv_at(&self, p: Vec3) -> Vec2 {
+        match self {
+            Geometry::Mesh(_) | Geometry::Deforming(_) | Geometry::Sdf(_) => Vec2::ZERO,
+            Geometry::Sphere(s) => s.at_point(p).uv,
+            Geometry::Disk(s) => s.at_point(p).uv,
+            Geometry::Cylinder(s) => s.at_point(p).uv,
+        }
+    }
+
     /// A point of triangle `prim` (of the whole shape if it is no mesh), uniform over the area.
     /// Of what deforms, in the middle of the shutter.
     pub fn sample_area(&self, prim: u32, u: Vec2) -> SurfaceSample {

@@ -1,65 +1,75 @@
-//! Shining surfaces that move: sampled in their own coordinates at the time of the receiver.
+//! Shining surfaces that move: a receiver sees them from their own coordinates, as they stand at its time.
 
-use super::local::{Part, Towards};
+use super::local::Towards;
 use super::tree::LightBounds;
+use crate::geom::Endpoint;
 use crate::geom::world::{normal, point};
-use crate::geom::{Endpoint, Geometry, Hit};
-use crate::math::{DVec3, Motion, Transform, Vec2, Vec3};
+use crate::math::{DVec3, Motion, Transform, Vec3};
 
-/// A point of `part` to connect to from `from`, at the time of `from`. `None` as for [`Part::sample`].
-pub(super) fn sample(
-    part: &Part,
-    g: &Geometry,
-    motion: &Motion,
-    from: &Hit,
-    u: Vec2,
-) -> Option<Towards> {
-    let to_world = motion.at(from.time);
-    let local = part.sample(g, into(&to_world, from.p), u)?;
-    let (p, p_err) = point(&to_world, local.end.p, local.end.p_err);
-    let d = (p - from.p).as_dvec3();
-    let wi = d.try_normalize()?.as_vec3();
-    let pdf = f64::from(local.pdf) * density(&to_world, local.wi.as_dvec3());
-    let pdf = pdf as f32;
-    (pdf > 0.0 && pdf < f32::MAX).then(|| Towards {
-        end: Endpoint {
-            p,
-            p_err,
-            ng: normal(&to_world, local.end.ng),
-        },
-        wi,
-        dist: d.length() as f32,
-        pdf,
-    })
+/// A surface at one time.
+pub(super) struct Moved {
+    to_world: Transform,
+    to_local: Transform,
 }
 
-/// Density per steradian at `from` with which [`sample`] returns the point of `met`.
-pub(super) fn pdf(part: &Part, g: &Geometry, motion: &Motion, from: &Hit, met: &Hit) -> f32 {
-    let to_world = motion.at(from.time);
-    let (eye, p) = (into(&to_world, from.p), into(&to_world, met.p));
-    let Some(w) = (p - eye).as_dvec3().try_normalize() else {
-        return 0.0;
-    };
-    let pdf = part.pdf(g, eye, p, normal(&to_world.inverse(), met.ng));
-    let pdf = f64::from(pdf) * density(&to_world, w);
-    match pdf > 0.0 {
-        true => pdf.clamp(f64::from(f32::MIN_POSITIVE), f64::from(f32::MAX)) as f32,
-        false => 0.0,
+impl Moved {
+    pub fn new(motion: &Motion, time: f32) -> Moved {
+        let to_world = motion.at(time);
+        Moved {
+            to_world,
+            to_local: to_world.inverse(),
+        }
+    }
+
+    /// A point of the world in the coordinates of the surface.
+    pub fn into(&self, p: Vec3) -> Vec3 {
+        self.to_local.point(p.as_dvec3()).as_vec3()
+    }
+
+    /// A unit normal of the world there.
+    pub fn normal_into(&self, n: Vec3) -> Vec3 {
+        normal(&self.to_local, n)
+    }
+
+    /// A connection found there, in the world for the receiver at `eye`. `None` as for
+    /// [`Part::sample`](super::local::Part::sample).
+    pub fn out(&self, local: &Towards, eye: Vec3) -> Option<Towards> {
+        let (p, p_err) = point(&self.to_world, local.end.p, local.end.p_err);
+        let d = (p - eye).as_dvec3();
+        let wi = d.try_normalize()?.as_vec3();
+        let pdf = (f64::from(local.pdf) * self.density(local.wi.as_dvec3())) as f32;
+        (pdf > 0.0 && pdf < f32::MAX).then(|| Towards {
+            end: Endpoint {
+                p,
+                p_err,
+                ng: normal(&self.to_world, local.end.ng),
+            },
+            wi,
+            dist: d.length() as f32,
+            pdf,
+        })
+    }
+
+    /// A density per steradian of the surface's coordinates, in the direction of `w` there, as one of the
+    /// world.
+    pub fn pdf_out(&self, pdf: f32, w: Vec3) -> f32 {
+        let w = w.as_dvec3().normalize_or_zero();
+        let pdf = f64::from(pdf) * self.density(w);
+        match pdf > 0.0 {
+            true => pdf.clamp(f64::from(f32::MIN_POSITIVE), f64::from(f32::MAX)) as f32,
+            false => 0.0,
+        }
+    }
+
+    /// The factor of that, for the unit vector `w`: dω_world = |det M| / |M w|³ dω_local, as the volume of
+    /// a thin cone shows.
+    fn density(&self, w: DVec3) -> f64 {
+        let m = self.to_world.matrix().matrix3;
+        (m * w).length().powi(3) / m.determinant().abs()
     }
 }
 
-fn into(to_world: &Transform, p: Vec3) -> Vec3 {
-    to_world.inverse().point(p.as_dvec3()).as_vec3()
-}
-
-/// What a density per steradian of object space, at the unit direction `w` there, is multiplied by to be one
-/// of world space: dω_world = |det M| / |M w|³ dω_object, as the volume of a thin cone shows.
-fn density(to_world: &Transform, w: DVec3) -> f64 {
-    let m = to_world.matrix().matrix3;
-    (m * w).length().powi(3) / m.determinant().abs()
-}
-
-/// What the light tree is to know of a part that is `bounds` in its own coordinates.
+/// What the choice of a light is to know of a part that is `bounds` in its own coordinates.
 pub(super) fn bounds(motion: &Motion, bounds: LightBounds) -> LightBounds {
     let middle = motion.at(0.5);
     // The area grows as the square of the scale does; the power only guides the choice.
@@ -75,5 +85,6 @@ pub(super) fn bounds(motion: &Motion, bounds: LightBounds) -> LightBounds {
         axis,
         cos_spread,
         power: power.clamp(f64::from(f32::MIN_POSITIVE), f64::from(f32::MAX)) as f32,
+        ..bounds
     }
 }

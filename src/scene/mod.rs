@@ -7,7 +7,7 @@ pub use camera::{Camera, CameraSample};
 pub use plan::{Plan, PlanEntry};
 
 use crate::geom::{Geometry, Hit, Ray, ShapeId, World};
-use crate::light::{Emitter, EmitterSample, Lights};
+use crate::light::{Emitter, EmitterSample, Lights, Strategy};
 use crate::material::{self, Material, Shading};
 use crate::math::{DVec3, Rgb, Vec2, Vec3};
 
@@ -74,7 +74,7 @@ impl Scene {
         center: DVec3,
         mut plan: Plan,
     ) -> Scene {
-        let emitters_can_be_met = emitters.iter().any(|e| !matches!(e, Emitter::Point { .. }));
+        let emitters_can_be_met = emitters.iter().any(Emitter::can_be_met);
         let tangents = materials.iter().any(Material::follows_tangents);
         match tangents {
             true => plan.add(
@@ -91,7 +91,7 @@ impl Scene {
         let mixed = materials.iter().any(Material::is_mixed);
         let masked = materials.iter().any(Material::lets_through);
         plan_of_masks(&mut plan, masked);
-        let lights = Lights::in_world(emitters, &world);
+        let lights = Lights::in_world(emitters, &world, Strategy::Auto);
         plan_of_world(&mut plan, &world);
         plan_of_lights(&mut plan, &lights, emitters_can_be_met);
         Scene {
@@ -210,6 +210,13 @@ impl Scene {
         self.lights.pdf_escaped(from, d)
     }
 
+    /// Chooses among the lights by `strategy` from now on: for comparisons, since the one that is chosen by
+    /// itself is meant to be the best.
+    pub fn choose_lights_by(&mut self, strategy: Strategy) {
+        let emitters = self.lights.emitters().to_vec();
+        self.lights = Lights::in_world(emitters, &self.world, strategy);
+    }
+
     pub fn is_emitter(&self, shape: ShapeId) -> bool {
         self.lights.is_emitter(shape)
     }
@@ -312,7 +319,7 @@ fn plan_of_lights(plan: &mut Plan, lights: &Lights, emitters_can_be_met: bool) {
     let (decision, reason) = lights.choice();
     plan.add("light choice", decision, reason);
     if !lights.is_empty() && !emitters_can_be_met {
-        let reason = "every light is a point, which no ray can meet";
+        let reason = "every light is a point or a beam, which no ray can meet";
         plan.add("last bounce", "no ray to meet an emitter", reason);
     }
 }

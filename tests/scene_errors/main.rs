@@ -2,6 +2,7 @@
 
 mod cameras;
 mod compiling;
+mod emitters;
 mod files;
 mod language;
 mod outside;

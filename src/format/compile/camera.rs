@@ -191,22 +191,7 @@ fn clips(sensor: &Props) -> Result<[f64; 2], SceneError> {
 
 fn perspective(sensor: &Props, film: &FilmSpec) -> Result<Perspective, SceneError> {
     let [near_clip, far_clip] = clips(sensor)?;
-    let (fov_deg, fov_axis) = match sensor.opt_float("fov")? {
-        Some(fov) => {
-            let axis = match sensor.choice("fov_axis")? {
-                "y" => FovAxis::Y,
-                "diagonal" => FovAxis::Diagonal,
-                "smaller" => FovAxis::Smaller,
-                "larger" => FovAxis::Larger,
-                _ => FovAxis::X,
-            };
-            (fov, axis)
-        }
-        None => {
-            sensor.ignore(&["fov_axis"]);
-            (fov_of_focal_length(sensor)?, FovAxis::Diagonal)
-        }
-    };
+    let (fov_deg, fov_axis) = field_of_view(sensor)?;
     let thin = sensor.plugin() == "thinlens";
     let (lens, principal_point_offset) = match thin {
         true => (thin_lens(sensor, far_clip)?, [0.0; 2]),
@@ -258,6 +243,22 @@ fn thin_lens(sensor: &Props, far_clip: f64) -> Result<Lens, SceneError> {
         None => Aperture::Disk,
     };
     Ok(Lens::new(radius, focus, aperture))
+}
+
+/// The field of view in degrees and what it is measured along.
+pub(super) fn field_of_view(p: &Props) -> Result<(f64, FovAxis), SceneError> {
+    let Some(fov) = p.opt_float("fov")? else {
+        p.ignore(&["fov_axis"]);
+        return Ok((fov_of_focal_length(p)?, FovAxis::Diagonal));
+    };
+    let axis = match p.choice("fov_axis")? {
+        "y" => FovAxis::Y,
+        "diagonal" => FovAxis::Diagonal,
+        "smaller" => FovAxis::Smaller,
+        "larger" => FovAxis::Larger,
+        _ => FovAxis::X,
+    };
+    Ok((fov, axis))
 }
 
 /// Diagonal field of view, in degrees, of a lens on 35 mm film (36 x 24 mm).

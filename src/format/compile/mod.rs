@@ -80,7 +80,14 @@ pub fn compile(desc: &SceneDesc, overrides: &Overrides) -> Result<Compiled, Scen
     for props in &shape_props {
         surfaces.push(materials.of_shape(props)?);
     }
-    let lights = lights::lights(&root, &shape_props, &mut materials, center, &mut warnings)?;
+    let lights = lights::lights(
+        &root,
+        &shape_props,
+        &world,
+        &mut materials,
+        center,
+        &mut warnings,
+    )?;
     if lights.is_empty() {
         warnings.push("the scene has no emitter, so the picture is black".to_string());
     }

@@ -11,6 +11,7 @@ mod lights;
 mod reference;
 mod sensors;
 mod shapes;
+mod spectra;
 mod unsupported;
 
 pub use reference::reference;
@@ -418,6 +419,7 @@ pub fn all() -> impl Iterator<Item = &'static Plugin> {
         shapes::PLUGINS,
         bsdfs::PLUGINS,
         lights::PLUGINS,
+        spectra::PLUGINS,
     ]
     .into_iter()
     .flatten()

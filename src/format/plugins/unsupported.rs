@@ -70,10 +70,6 @@ const TABLE: &[(Category, &[&str], &str)] = &[
     (
         Emitter,
         &[
-            "spot",
-            "directional",
-            "directionalarea",
-            "projector",
             "collimated",
             "sun",
             "sky",
@@ -81,22 +77,9 @@ const TABLE: &[(Category, &[&str], &str)] = &[
             "volumelight",
             "timed_sunsky",
         ],
-        "use an area light, a point light or an environment map",
+        "use a directional light, an area light or an environment map",
     ),
-    (
-        Texture,
-        &[
-            "uniform",
-            "d65",
-            "blackbody",
-            "regular",
-            "irregular",
-            "srgb",
-            "rawconstant",
-            "discrete",
-        ],
-        RGB,
-    ),
+    (Texture, &["rawconstant", "discrete"], RGB),
     (
         Texture,
         &[

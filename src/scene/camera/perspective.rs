@@ -15,6 +15,21 @@ pub enum FovAxis {
     Larger,
 }
 
+impl FovAxis {
+    /// Half the width, at unit depth, of a picture of `width` by `height` that `fov_deg` spans along this.
+    pub fn half_width(self, fov_deg: f64, width: f64, height: f64) -> f64 {
+        let (w, h) = (width, height);
+        (0.5 * fov_deg.to_radians()).tan()
+            * match self {
+                FovAxis::X => 1.0,
+                FovAxis::Y => w / h,
+                FovAxis::Diagonal => w / w.hypot(h),
+                FovAxis::Smaller => (w / h).max(1.0),
+                FovAxis::Larger => (w / h).min(1.0),
+            }
+    }
+}
+
 /// What makes a perspective camera; distances in scene units.
 #[derive(Clone, Copy, Debug)]
 pub struct PerspectiveSpec {
@@ -42,16 +57,7 @@ pub struct Perspective {
 impl Perspective {
     pub fn new(spec: &PerspectiveSpec, film: &FilmSpec) -> Perspective {
         let (w, h) = (f64::from(film.width), f64::from(film.height));
-        let tan = (0.5 * spec.fov_deg.to_radians()).tan();
-        // Half the width of the picture at unit depth.
-        let half_width = tan
-            * match spec.fov_axis {
-                FovAxis::X => 1.0,
-                FovAxis::Y => w / h,
-                FovAxis::Diagonal => w / w.hypot(h),
-                FovAxis::Smaller => (w / h).max(1.0),
-                FovAxis::Larger => (w / h).min(1.0),
-            };
+        let half_width = spec.fov_axis.half_width(spec.fov_deg, w, h);
         // x = half_width (1 - 2 (px / w + offset)), likewise y with half_width h / w.
         let [ox, oy] = spec.principal_point_offset;
         let half_height = half_width * h / w;

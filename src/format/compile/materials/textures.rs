@@ -54,7 +54,7 @@ impl<'a> Materials<'a> {
         }
     }
 
-    pub(super) fn resolve(&mut self, value: RgbOrTexture) -> Result<Texture, SceneError> {
+    pub fn resolve(&mut self, value: RgbOrTexture) -> Result<Texture, SceneError> {
         match value {
             RgbOrTexture::Rgb(c) => Ok(Texture::Constant(c)),
             RgbOrTexture::Texture(id) => self.texture(id),
@@ -85,6 +85,18 @@ impl<'a> Materials<'a> {
         }
         self.per_shape |= outer;
         Ok(texture)
+    }
+
+    /// Width and height of the picture that a texture shows, also where it folded into one colour; 1 by 1 for
+    /// any other texture. Of those that are compiled already.
+    pub fn picture_size(&self, id: ObjectId) -> [u32; 2] {
+        let p = self.desc.object(id);
+        let key = match (p.plugin(), p.file("filename"), p.bool("raw")) {
+            ("bitmap", Ok(file), Ok(raw)) => (file.to_path_buf(), raw),
+            _ => return [1; 2],
+        };
+        let picture = self.pictures.get(&key);
+        picture.map_or([1; 2], |picture| [picture.width, picture.height])
     }
 
     fn bitmap(&mut self, p: &Props<'a>, to_uv: Affine2) -> Result<Texture, SceneError> {
