@@ -1,10 +1,12 @@
 //! Materials: from a hit, by way of textures, to the numbers of a [`Bsdf`].
 
+mod dielectrics;
 mod shading;
 
+pub use dielectrics::{Coated, Glass};
 pub use shading::Shading;
 
-use crate::bsdf::{Bsdf, Conductor, Dielectric, Diffuse, Microfacet, RoughConductor, Shape};
+use crate::bsdf::{Bsdf, Conductor, Diffuse, Microfacet, RoughConductor, Shape};
 use crate::geom::Hit;
 use crate::math::Frame;
 use crate::texture::{At, Texture};
@@ -24,11 +26,14 @@ pub enum Material {
         metal: Metal,
         roughness: Roughness,
     },
-    Dielectric {
-        eta: f32,
-        reflectance: Texture,
-        transmittance: Texture,
+    Dielectric(Glass),
+    ThinDielectric(Glass),
+    RoughDielectric {
+        glass: Glass,
+        roughness: Roughness,
     },
+    /// Plastic, smooth or rough.
+    Coated(Coated),
     /// One-sided materials for the front and the back, each as if its side were the front.
     TwoSided {
         front: Box<Material>,
@@ -94,15 +99,10 @@ impl Material {
                 facets: roughness.at(at),
                 metal: metal.at(at),
             }),
-            Material::Dielectric {
-                eta,
-                reflectance,
-                transmittance,
-            } => Bsdf::Dielectric(Dielectric {
-                reflectance: reflectance.eval(at),
-                transmittance: transmittance.eval(at),
-                ..Dielectric::new(*eta)
-            }),
+            Material::Dielectric(glass) => Bsdf::Dielectric(glass.smooth(at)),
+            Material::ThinDielectric(glass) => glass.thin(at),
+            Material::RoughDielectric { glass, roughness } => glass.rough(roughness, at),
+            Material::Coated(coated) => coated.at(at),
             Material::TwoSided { front, .. } => front.bsdf(at),
         }
     }
@@ -122,7 +122,9 @@ impl Material {
             | Material::UniformBothSides(Bsdf::RoughConductor(b)) => {
                 b.facets.alpha.x != b.facets.alpha.y
             }
-            Material::RoughConductor { roughness, .. } => roughness.anisotropic,
+            Material::Uniform(Bsdf::RoughDielectric(b)) => b.facets.alpha.x != b.facets.alpha.y,
+            Material::RoughConductor { roughness, .. }
+            | Material::RoughDielectric { roughness, .. } => roughness.anisotropic,
             Material::TwoSided { front, back } => front.is_anisotropic() || back.is_anisotropic(),
             _ => false,
         }
@@ -165,11 +167,12 @@ impl Material {
             } => {
                 vec![&m.eta, &m.k, &m.reflectance, &r.alpha_u, &r.alpha_v]
             }
-            Material::Dielectric {
-                reflectance,
-                transmittance,
-                ..
-            } => vec![reflectance, transmittance],
+            Material::Dielectric(glass) | Material::ThinDielectric(glass) => glass.textures(),
+            Material::RoughDielectric {
+                glass,
+                roughness: r,
+            } => [glass.textures(), vec![&r.alpha_u, &r.alpha_v]].concat(),
+            Material::Coated(coated) => coated.textures(),
         }
     }
 }

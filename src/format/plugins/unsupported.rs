@@ -38,10 +38,6 @@ const TABLE: &[(Category, &[&str], &str)] = &[
     (
         Bsdf,
         &[
-            "roughdielectric",
-            "thindielectric",
-            "plastic",
-            "roughplastic",
             "principled",
             "principledthin",
             "pplastic",
@@ -64,7 +60,7 @@ const TABLE: &[(Category, &[&str], &str)] = &[
         &["bumpmap", "normalmap", "displacement"],
         "put the material in its place and the relief into the mesh",
     ),
-    (Bsdf, &["mask", "null"], "cut the holes out of the mesh"),
+    (Bsdf, &["mask"], "cut the holes out of the mesh"),
     (
         Bsdf,
         &[

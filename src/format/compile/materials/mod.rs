@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::bsdf::{Bsdf, Diffuse, Shape, metals};
+use crate::bsdf::{Bsdf, Diffuse, Null, Shape, metals};
 use crate::format::plugins::Category;
 use crate::format::{ObjectId, Props, SceneDesc, SceneError};
 use crate::material::{Material, Metal, Roughness};
@@ -14,6 +14,7 @@ use crate::texture::{Picture, Texture};
 
 use super::suggest;
 
+mod dielectrics;
 mod textures;
 
 pub struct Materials<'a> {
@@ -95,7 +96,7 @@ impl<'a> Materials<'a> {
             "twosided" => {
                 let sides = p.children(Category::Bsdf);
                 for side in &sides {
-                    if matches!(side.plugin(), "dielectric" | "twosided") {
+                    if TWO_SIDED.contains(&side.plugin()) {
                         let what = format!("\"{}\" already has two sides", side.plugin());
                         return Err(side
                             .error(what)
@@ -113,47 +114,45 @@ impl<'a> Materials<'a> {
                 Material::TwoSided { front, back }
             }
             "conductor" => Material::Conductor(self.metal(p)?),
-            "roughconductor" => {
-                let alpha = self.scalar(p, "alpha")?;
-                let mut along = |name: &str, other: &str| -> Result<Texture, SceneError> {
-                    match (p.is_given(name), p.is_given(other)) {
-                        (false, false) => Ok(alpha.clone()),
-                        (true, true) => self.scalar(p, name),
-                        _ => {
-                            let error = p.error("alpha_u and alpha_v come together");
-                            Err(error.with_help("give both, or alpha alone"))
-                        }
-                    }
-                };
-                let (alpha_u, alpha_v) =
-                    (along("alpha_u", "alpha_v")?, along("alpha_v", "alpha_u")?);
-                let shape = match p.choice("distribution")? {
-                    "ggx" => Shape::Ggx,
-                    _ => Shape::Beckmann,
-                };
-                let roughness = Roughness {
-                    shape,
-                    anisotropic: p.is_given("alpha_u"),
-                    alpha_u,
-                    alpha_v,
-                    visible: p.bool("sample_visible")?,
-                };
-                Material::RoughConductor {
-                    metal: self.metal(p)?,
-                    roughness,
-                }
-            }
-            "dielectric" => {
-                let (inside, outside) = (p.ior("int_ior")?, p.ior("ext_ior")?);
-                Material::Dielectric {
-                    eta: (inside / outside) as f32,
-                    reflectance: self.reflectance(p, "specular_reflectance")?,
-                    transmittance: self.reflectance(p, "specular_transmittance")?,
-                }
-            }
+            "roughconductor" => Material::RoughConductor {
+                roughness: self.roughness(p)?,
+                metal: self.metal(p)?,
+            },
+            "dielectric" => Material::Dielectric(self.glass(p)?),
+            "thindielectric" => Material::ThinDielectric(self.glass(p)?),
+            "roughdielectric" => Material::RoughDielectric {
+                roughness: self.roughness(p)?,
+                glass: self.glass(p)?,
+            },
+            "plastic" => self.plastic(p)?,
+            "roughplastic" => self.rough_plastic(p)?,
+            "null" => Material::Uniform(Bsdf::Null(Null {
+                transmittance: Rgb::WHITE,
+            })),
             _ => Material::Diffuse {
                 reflectance: self.reflectance(p, "reflectance")?,
             },
+        })
+    }
+
+    fn roughness(&mut self, p: &Props<'a>) -> Result<Roughness, SceneError> {
+        let alpha = self.scalar(p, "alpha")?;
+        let mut along = |name: &str, other: &str| -> Result<Texture, SceneError> {
+            match (p.is_given(name), p.is_given(other)) {
+                (false, false) => Ok(alpha.clone()),
+                (true, true) => self.scalar(p, name),
+                _ => {
+                    let error = p.error("alpha_u and alpha_v come together");
+                    Err(error.with_help("give both, or alpha alone"))
+                }
+            }
+        };
+        Ok(Roughness {
+            shape: roughness_shape(p)?,
+            alpha_u: along("alpha_u", "alpha_v")?,
+            alpha_v: along("alpha_v", "alpha_u")?,
+            anisotropic: p.is_given("alpha_u"),
+            visible: p.bool("sample_visible")?,
         })
     }
 
@@ -177,6 +176,22 @@ impl<'a> Materials<'a> {
         })
     }
 }
+
+fn roughness_shape(p: &Props) -> Result<Shape, SceneError> {
+    Ok(match p.choice("distribution")? {
+        "ggx" => Shape::Ggx,
+        _ => Shape::Beckmann,
+    })
+}
+
+/// Materials that say themselves what both of their sides do.
+const TWO_SIDED: &[&str] = &[
+    "twosided",
+    "dielectric",
+    "thindielectric",
+    "roughdielectric",
+    "null",
+];
 
 /// Reflectance of a shape without a material, as in Mitsuba, unless it emits light: then it is black.
 const DEFAULT_REFLECTANCE: f32 = 0.5;
