@@ -10,11 +10,17 @@ pub mod fresnel;
 pub mod iors;
 pub mod metals;
 pub mod microfacet;
+pub mod plastic;
+pub mod rough_dielectric;
+pub mod rough_plastic;
 
 pub use conductor::{Conductor, RoughConductor};
 pub use dielectric::{Dielectric, Null, ThinDielectric};
 pub use diffuse::Diffuse;
 pub use microfacet::{Microfacet, Shape};
+pub use plastic::{Base, Plastic};
+pub use rough_dielectric::RoughDielectric;
+pub use rough_plastic::{Coat, RoughPlastic};
 
 use crate::math::{Rgb, Vec2, Vec3};
 
@@ -71,6 +77,9 @@ pub enum Bsdf {
     RoughConductor(RoughConductor),
     Dielectric(Dielectric),
     ThinDielectric(ThinDielectric),
+    RoughDielectric(RoughDielectric),
+    Plastic(Plastic),
+    RoughPlastic(RoughPlastic),
     Null(Null),
 }
 
@@ -89,6 +98,9 @@ impl Bsdf {
         match self {
             Bsdf::Diffuse(b) => b.eval_pdf(wo, wi).1,
             Bsdf::RoughConductor(b) => b.pdf(wo, wi),
+            Bsdf::RoughDielectric(b) => b.eval_pdf(wo, wi, Mode::Radiance).1,
+            Bsdf::Plastic(b) => b.eval_pdf(wo, wi).1,
+            Bsdf::RoughPlastic(b) => b.eval_pdf(wo, wi).1,
             Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Null(_) => {
                 0.0
             }
@@ -97,10 +109,13 @@ impl Bsdf {
 
     /// [`Bsdf::eval`] and [`Bsdf::pdf`] at once: multiple importance sampling needs both.
     #[inline]
-    pub fn eval_pdf(&self, wo: Vec3, wi: Vec3, _mode: Mode) -> (Rgb, f32) {
+    pub fn eval_pdf(&self, wo: Vec3, wi: Vec3, mode: Mode) -> (Rgb, f32) {
         match self {
             Bsdf::Diffuse(b) => b.eval_pdf(wo, wi),
             Bsdf::RoughConductor(b) => b.eval_pdf(wo, wi),
+            Bsdf::RoughDielectric(b) => b.eval_pdf(wo, wi, mode),
+            Bsdf::Plastic(b) => b.eval_pdf(wo, wi),
+            Bsdf::RoughPlastic(b) => b.eval_pdf(wo, wi),
             Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Null(_) => {
                 (Rgb::BLACK, 0.0)
             }
@@ -117,6 +132,9 @@ impl Bsdf {
             Bsdf::RoughConductor(b) => b.sample(wo, u),
             Bsdf::Dielectric(b) => b.sample(wo, u_lobe, mode),
             Bsdf::ThinDielectric(b) => b.sample(wo, u_lobe),
+            Bsdf::RoughDielectric(b) => b.sample(wo, u_lobe, u, mode),
+            Bsdf::Plastic(b) => b.sample(wo, u_lobe, u),
+            Bsdf::RoughPlastic(b) => b.sample(wo, u_lobe, u),
             Bsdf::Null(b) => b.sample(wo),
         }
     }
@@ -124,13 +142,23 @@ impl Bsdf {
     /// Only delta lobes: a connection to a light or a photon carries nothing.
     #[inline]
     pub fn is_delta(&self) -> bool {
-        !matches!(self, Bsdf::Diffuse(_) | Bsdf::RoughConductor(_))
+        matches!(
+            self,
+            Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Null(_)
+        )
     }
 
     /// Whether [`Bsdf::sample`] uses `u_lobe`.
     #[inline]
     pub fn has_lobes(&self) -> bool {
-        matches!(self, Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_))
+        matches!(
+            self,
+            Bsdf::Dielectric(_)
+                | Bsdf::ThinDielectric(_)
+                | Bsdf::RoughDielectric(_)
+                | Bsdf::Plastic(_)
+                | Bsdf::RoughPlastic(_)
+        )
     }
 
     /// Nothing but a diffuse lobe: irradiance is all there is to know of the light that arrives.
@@ -139,17 +167,19 @@ impl Bsdf {
         matches!(self, Bsdf::Diffuse(_))
     }
 
-    /// Reflectance of the diffuse lobe, 0 without one.
+    /// Reflectance of the diffuse lobe for light that arrives equally from all directions, 0 without one.
     #[inline]
     pub fn diffuse_albedo(&self) -> Rgb {
         match self {
             Bsdf::Diffuse(b) => b.albedo,
+            Bsdf::Plastic(b) => b.diffuse_albedo(),
+            Bsdf::RoughPlastic(b) => b.diffuse_albedo(),
             _ => Rgb::BLACK,
         }
     }
 
     /// Share of the light from `wo` that is scattered on, for the albedo layer (denoisers): exact for
-    /// smooth surfaces, for rough metals the Fresnel reflectance without masking.
+    /// smooth surfaces, for rough ones the Fresnel reflectance without masking.
     pub fn albedo(&self, wo: Vec3) -> Rgb {
         let metal = |b: &Conductor| match wo.z > 0.0 {
             true => b.fresnel(wo.z),
@@ -162,6 +192,9 @@ impl Bsdf {
             Bsdf::RoughConductor(b) => metal(&b.metal),
             Bsdf::Dielectric(b) => b.albedo(wo),
             Bsdf::ThinDielectric(b) => b.albedo(wo),
+            Bsdf::RoughDielectric(b) => b.albedo(wo),
+            Bsdf::Plastic(b) => b.albedo(wo),
+            Bsdf::RoughPlastic(b) => b.albedo(wo),
             Bsdf::Null(b) => b.transmittance,
         }
     }

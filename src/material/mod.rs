@@ -1,15 +1,17 @@
 //! Materials: from a hit, by way of textures, to the numbers of a [`Bsdf`].
 
+mod dielectrics;
 mod relief;
 mod shading;
 
+pub use dielectrics::{Coated, Glass};
 pub use relief::{Map, Relief};
 pub use shading::Shading;
 
 use relief::Smooth;
 use shading::Bend;
 
-use crate::bsdf::{Bsdf, Conductor, Dielectric, Diffuse, Microfacet, Null, RoughConductor, Shape};
+use crate::bsdf::{Bsdf, Conductor, Diffuse, Microfacet, Null, RoughConductor, Shape};
 use crate::geom::Hit;
 use crate::math::fp::ONE_MINUS_EPSILON;
 use crate::math::{Frame, Rgb, Vec3};
@@ -30,11 +32,14 @@ pub enum Material {
         metal: Metal,
         roughness: Roughness,
     },
-    Dielectric {
-        eta: f32,
-        reflectance: Texture,
-        transmittance: Texture,
+    Dielectric(Glass),
+    ThinDielectric(Glass),
+    RoughDielectric {
+        glass: Glass,
+        roughness: Roughness,
     },
+    /// Plastic, smooth or rough.
+    Coated(Coated),
     /// `inside` where the texture (a share, 0 to 1) has the surface there; elsewhere light passes straight on.
     Mask {
         opacity: Texture,
@@ -176,15 +181,10 @@ impl Material {
                 facets: roughness.at(at),
                 metal: metal.at(at),
             }),
-            Material::Dielectric {
-                eta,
-                reflectance,
-                transmittance,
-            } => Bsdf::Dielectric(Dielectric {
-                reflectance: reflectance.eval(at),
-                transmittance: transmittance.eval(at),
-                ..Dielectric::new(*eta)
-            }),
+            Material::Dielectric(glass) => Bsdf::Dielectric(glass.smooth(at)),
+            Material::ThinDielectric(glass) => glass.thin(at),
+            Material::RoughDielectric { glass, roughness } => glass.rough(roughness, at),
+            Material::Coated(coated) => coated.at(at),
             Material::TwoSided { front: inside, .. }
             | Material::Mask { inside, .. }
             | Material::Relief { inside, .. } => inside.bsdf(at),
@@ -220,7 +220,9 @@ impl Material {
             | Material::UniformBothSides(Bsdf::RoughConductor(b)) => {
                 b.facets.alpha.x != b.facets.alpha.y
             }
-            Material::RoughConductor { roughness, .. } => roughness.anisotropic,
+            Material::Uniform(Bsdf::RoughDielectric(b)) => b.facets.alpha.x != b.facets.alpha.y,
+            Material::RoughConductor { roughness, .. }
+            | Material::RoughDielectric { roughness, .. } => roughness.anisotropic,
             Material::TwoSided { front, back } => {
                 front.follows_tangents() || back.follows_tangents()
             }
@@ -301,11 +303,12 @@ impl Material {
             } => {
                 vec![&m.eta, &m.k, &m.reflectance, &r.alpha_u, &r.alpha_v]
             }
-            Material::Dielectric {
-                reflectance,
-                transmittance,
-                ..
-            } => vec![reflectance, transmittance],
+            Material::Dielectric(glass) | Material::ThinDielectric(glass) => glass.textures(),
+            Material::RoughDielectric {
+                glass,
+                roughness: r,
+            } => [glass.textures(), vec![&r.alpha_u, &r.alpha_v]].concat(),
+            Material::Coated(coated) => coated.textures(),
         }
     }
 }

@@ -30,10 +30,6 @@ const TABLE: &[(Category, &[&str], &str)] = &[
     (
         Bsdf,
         &[
-            "roughdielectric",
-            "thindielectric",
-            "plastic",
-            "roughplastic",
             "principled",
             "principledthin",
             "pplastic",
@@ -55,7 +51,6 @@ const TABLE: &[(Category, &[&str], &str)] = &[
         &["displacement"],
         "use \"bumpmap\", or put the relief into the mesh",
     ),
-    (Bsdf, &["null"], "cut the holes out of the mesh"),
     (
         Bsdf,
         &[

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::bsdf::{Bsdf, Diffuse, Shape, metals};
+use crate::bsdf::{Bsdf, Diffuse, Null, Shape, metals};
 use crate::format::plugins::Category;
 use crate::format::{ObjectId, Props, SceneDesc, SceneError};
 use crate::material::{Material, Metal, Roughness};
@@ -17,6 +17,7 @@ use super::suggest;
 
 mod attribute;
 mod composed;
+mod dielectrics;
 mod textures;
 
 pub struct Materials<'a> {
@@ -129,47 +130,45 @@ impl<'a> Materials<'a> {
             }
             "mask" | "blendbsdf" | "bumpmap" | "normalmap" => self.composed(p)?,
             "conductor" => Material::Conductor(self.metal(p)?),
-            "roughconductor" => {
-                let alpha = self.scalar(p, "alpha")?;
-                let mut along = |name: &str, other: &str| -> Result<Texture, SceneError> {
-                    match (p.is_given(name), p.is_given(other)) {
-                        (false, false) => Ok(alpha.clone()),
-                        (true, true) => self.scalar(p, name),
-                        _ => {
-                            let error = p.error("alpha_u and alpha_v come together");
-                            Err(error.with_help("give both, or alpha alone"))
-                        }
-                    }
-                };
-                let (alpha_u, alpha_v) =
-                    (along("alpha_u", "alpha_v")?, along("alpha_v", "alpha_u")?);
-                let shape = match p.choice("distribution")? {
-                    "ggx" => Shape::Ggx,
-                    _ => Shape::Beckmann,
-                };
-                let roughness = Roughness {
-                    shape,
-                    anisotropic: p.is_given("alpha_u"),
-                    alpha_u,
-                    alpha_v,
-                    visible: p.bool("sample_visible")?,
-                };
-                Material::RoughConductor {
-                    metal: self.metal(p)?,
-                    roughness,
-                }
-            }
-            "dielectric" => {
-                let (inside, outside) = (p.ior("int_ior")?, p.ior("ext_ior")?);
-                Material::Dielectric {
-                    eta: (inside / outside) as f32,
-                    reflectance: self.reflectance(p, "specular_reflectance")?,
-                    transmittance: self.reflectance(p, "specular_transmittance")?,
-                }
-            }
+            "roughconductor" => Material::RoughConductor {
+                roughness: self.roughness(p)?,
+                metal: self.metal(p)?,
+            },
+            "dielectric" => Material::Dielectric(self.glass(p)?),
+            "thindielectric" => Material::ThinDielectric(self.glass(p)?),
+            "roughdielectric" => Material::RoughDielectric {
+                roughness: self.roughness(p)?,
+                glass: self.glass(p)?,
+            },
+            "plastic" => self.plastic(p)?,
+            "roughplastic" => self.rough_plastic(p)?,
+            "null" => Material::Uniform(Bsdf::Null(Null {
+                transmittance: Rgb::WHITE,
+            })),
             _ => Material::Diffuse {
                 reflectance: self.reflectance(p, "reflectance")?,
             },
+        })
+    }
+
+    fn roughness(&mut self, p: &Props<'a>) -> Result<Roughness, SceneError> {
+        let alpha = self.scalar(p, "alpha")?;
+        let mut along = |name: &str, other: &str| -> Result<Texture, SceneError> {
+            match (p.is_given(name), p.is_given(other)) {
+                (false, false) => Ok(alpha.clone()),
+                (true, true) => self.scalar(p, name),
+                _ => {
+                    let error = p.error("alpha_u and alpha_v come together");
+                    Err(error.with_help("give both, or alpha alone"))
+                }
+            }
+        };
+        Ok(Roughness {
+            shape: roughness_shape(p)?,
+            alpha_u: along("alpha_u", "alpha_v")?,
+            alpha_v: along("alpha_v", "alpha_u")?,
+            anisotropic: p.is_given("alpha_u"),
+            visible: p.bool("sample_visible")?,
         })
     }
 
@@ -192,6 +191,13 @@ impl<'a> Materials<'a> {
             reflectance: self.reflectance(p, "specular_reflectance")?,
         })
     }
+}
+
+fn roughness_shape(p: &Props) -> Result<Shape, SceneError> {
+    Ok(match p.choice("distribution")? {
+        "ggx" => Shape::Ggx,
+        _ => Shape::Beckmann,
+    })
 }
 
 /// Reflectance of a shape without a material, as in Mitsuba, unless it emits light: then it is black.
