@@ -10,11 +10,13 @@ pub mod fresnel;
 pub mod iors;
 pub mod metals;
 pub mod microfacet;
+pub mod principled;
 
 pub use conductor::{Conductor, RoughConductor};
 pub use dielectric::{Dielectric, Null, ThinDielectric};
 pub use diffuse::Diffuse;
 pub use microfacet::{Microfacet, Shape};
+pub use principled::{Principled, PrincipledThin};
 
 use crate::math::{Rgb, Vec2, Vec3};
 
@@ -71,10 +73,12 @@ pub enum Bsdf {
     RoughConductor(RoughConductor),
     Dielectric(Dielectric),
     ThinDielectric(ThinDielectric),
+    Principled(Principled),
+    PrincipledThin(PrincipledThin),
     Null(Null),
 }
 
-const _: () = assert!(size_of::<Bsdf>() <= 64);
+const _: () = assert!(size_of::<Bsdf>() <= 76);
 
 impl Bsdf {
     /// f(wo, wi) in 1/sr, without cosine. Delta lobes contribute nothing.
@@ -89,6 +93,8 @@ impl Bsdf {
         match self {
             Bsdf::Diffuse(b) => b.eval_pdf(wo, wi).1,
             Bsdf::RoughConductor(b) => b.pdf(wo, wi),
+            Bsdf::Principled(b) => b.eval_pdf(wo, wi, Mode::Radiance).1,
+            Bsdf::PrincipledThin(b) => b.eval_pdf(wo, wi, Mode::Radiance).1,
             Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Null(_) => {
                 0.0
             }
@@ -97,10 +103,12 @@ impl Bsdf {
 
     /// [`Bsdf::eval`] and [`Bsdf::pdf`] at once: multiple importance sampling needs both.
     #[inline]
-    pub fn eval_pdf(&self, wo: Vec3, wi: Vec3, _mode: Mode) -> (Rgb, f32) {
+    pub fn eval_pdf(&self, wo: Vec3, wi: Vec3, mode: Mode) -> (Rgb, f32) {
         match self {
             Bsdf::Diffuse(b) => b.eval_pdf(wo, wi),
             Bsdf::RoughConductor(b) => b.eval_pdf(wo, wi),
+            Bsdf::Principled(b) => b.eval_pdf(wo, wi, mode),
+            Bsdf::PrincipledThin(b) => b.eval_pdf(wo, wi, mode),
             Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Null(_) => {
                 (Rgb::BLACK, 0.0)
             }
@@ -117,6 +125,8 @@ impl Bsdf {
             Bsdf::RoughConductor(b) => b.sample(wo, u),
             Bsdf::Dielectric(b) => b.sample(wo, u_lobe, mode),
             Bsdf::ThinDielectric(b) => b.sample(wo, u_lobe),
+            Bsdf::Principled(b) => b.sample(wo, u_lobe, u, mode),
+            Bsdf::PrincipledThin(b) => b.sample(wo, u_lobe, u, mode),
             Bsdf::Null(b) => b.sample(wo),
         }
     }
@@ -124,13 +134,25 @@ impl Bsdf {
     /// Only delta lobes: a connection to a light or a photon carries nothing.
     #[inline]
     pub fn is_delta(&self) -> bool {
-        !matches!(self, Bsdf::Diffuse(_) | Bsdf::RoughConductor(_))
+        !matches!(
+            self,
+            Bsdf::Diffuse(_)
+                | Bsdf::RoughConductor(_)
+                | Bsdf::Principled(_)
+                | Bsdf::PrincipledThin(_)
+        )
     }
 
     /// Whether [`Bsdf::sample`] uses `u_lobe`.
     #[inline]
     pub fn has_lobes(&self) -> bool {
-        matches!(self, Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_))
+        matches!(
+            self,
+            Bsdf::Dielectric(_)
+                | Bsdf::ThinDielectric(_)
+                | Bsdf::Principled(_)
+                | Bsdf::PrincipledThin(_)
+        )
     }
 
     /// Nothing but a diffuse lobe: irradiance is all there is to know of the light that arrives.
@@ -162,6 +184,8 @@ impl Bsdf {
             Bsdf::RoughConductor(b) => metal(&b.metal),
             Bsdf::Dielectric(b) => b.albedo(wo),
             Bsdf::ThinDielectric(b) => b.albedo(wo),
+            Bsdf::Principled(b) => b.albedo(wo),
+            Bsdf::PrincipledThin(b) => b.albedo(wo),
             Bsdf::Null(b) => b.transmittance,
         }
     }

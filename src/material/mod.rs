@@ -1,7 +1,9 @@
 //! Materials: from a hit, by way of textures, to the numbers of a [`Bsdf`].
 
+mod principled;
 mod shading;
 
+pub use principled::{BaseTextures, PrincipledTextures, ThinTextures};
 pub use shading::Shading;
 
 use crate::bsdf::{Bsdf, Conductor, Dielectric, Diffuse, Microfacet, RoughConductor, Shape};
@@ -29,6 +31,8 @@ pub enum Material {
         reflectance: Texture,
         transmittance: Texture,
     },
+    Principled(Box<PrincipledTextures>),
+    PrincipledThin(Box<ThinTextures>),
     /// One-sided materials for the front and the back, each as if its side were the front.
     TwoSided {
         front: Box<Material>,
@@ -103,6 +107,8 @@ impl Material {
                 transmittance: transmittance.eval(at),
                 ..Dielectric::new(*eta)
             }),
+            Material::Principled(p) => p.at(at),
+            Material::PrincipledThin(p) => p.at(at),
             Material::TwoSided { front, .. } => front.bsdf(at),
         }
     }
@@ -122,7 +128,12 @@ impl Material {
             | Material::UniformBothSides(Bsdf::RoughConductor(b)) => {
                 b.facets.alpha.x != b.facets.alpha.y
             }
+            Material::Uniform(Bsdf::Principled(b))
+            | Material::UniformBothSides(Bsdf::Principled(b)) => b.base.is_anisotropic(),
+            Material::Uniform(Bsdf::PrincipledThin(b)) => b.base.is_anisotropic(),
             Material::RoughConductor { roughness, .. } => roughness.anisotropic,
+            Material::Principled(p) => p.base.is_anisotropic(),
+            Material::PrincipledThin(p) => p.base.is_anisotropic(),
             Material::TwoSided { front, back } => front.is_anisotropic() || back.is_anisotropic(),
             _ => false,
         }
@@ -170,6 +181,8 @@ impl Material {
                 transmittance,
                 ..
             } => vec![reflectance, transmittance],
+            Material::Principled(p) => p.textures(),
+            Material::PrincipledThin(p) => p.textures(),
         }
     }
 }

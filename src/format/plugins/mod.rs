@@ -8,6 +8,7 @@
 mod bsdfs;
 mod cameras;
 mod lights;
+mod principled;
 mod reference;
 mod shapes;
 mod unsupported;
@@ -402,6 +403,7 @@ pub fn all() -> impl Iterator<Item = &'static Plugin> {
         cameras::PLUGINS,
         shapes::PLUGINS,
         bsdfs::PLUGINS,
+        principled::PLUGINS,
         lights::PLUGINS,
     ]
     .into_iter()

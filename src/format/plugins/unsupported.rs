@@ -42,8 +42,6 @@ const TABLE: &[(Category, &[&str], &str)] = &[
             "thindielectric",
             "plastic",
             "roughplastic",
-            "principled",
-            "principledthin",
             "pplastic",
             "phong",
             "ward",

@@ -14,6 +14,7 @@ use crate::texture::{Picture, Texture};
 
 use super::suggest;
 
+mod principled;
 mod textures;
 
 pub struct Materials<'a> {
@@ -95,7 +96,7 @@ impl<'a> Materials<'a> {
             "twosided" => {
                 let sides = p.children(Category::Bsdf);
                 for side in &sides {
-                    if matches!(side.plugin(), "dielectric" | "twosided") {
+                    if matches!(side.plugin(), "dielectric" | "principledthin" | "twosided") {
                         let what = format!("\"{}\" already has two sides", side.plugin());
                         return Err(side
                             .error(what)
@@ -105,9 +106,9 @@ impl<'a> Materials<'a> {
                 let [Some(first), last] = [sides.first(), sides.last()] else {
                     return Err(p.error("\"twosided\" needs a material inside"));
                 };
-                let front = Box::new(self.material(first)?);
+                let front = Box::new(self.one_sided(first)?);
                 let back = match last {
-                    Some(last) if sides.len() == 2 => Box::new(self.material(last)?),
+                    Some(last) if sides.len() == 2 => Box::new(self.one_sided(last)?),
                     _ => front.clone(),
                 };
                 Material::TwoSided { front, back }
@@ -151,10 +152,27 @@ impl<'a> Materials<'a> {
                     transmittance: self.reflectance(p, "specular_transmittance")?,
                 }
             }
+            "principled" => self.principled(p)?,
+            "principledthin" => self.principled_thin(p)?,
             _ => Material::Diffuse {
                 reflectance: self.reflectance(p, "reflectance")?,
             },
         })
+    }
+
+    /// A material for one side of a surface: nothing goes through it.
+    fn one_sided(&mut self, p: &Props<'a>) -> Result<Material, SceneError> {
+        let material = self.material(p)?;
+        match &material {
+            Material::Principled(m) if m.base.is_clear() => {
+                let error = p.error_at(
+                    "spec_trans",
+                    "what light goes through already has two sides",
+                );
+                Err(error.with_help("leave out spec_trans, or \"twosided\" around the material"))
+            }
+            _ => Ok(material),
+        }
     }
 
     fn metal(&mut self, p: &Props<'a>) -> Result<Metal, SceneError> {
