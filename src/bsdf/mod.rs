@@ -11,6 +11,7 @@ pub mod iors;
 pub mod metals;
 pub mod microfacet;
 pub mod plastic;
+pub mod principled;
 pub mod rough_dielectric;
 pub mod rough_plastic;
 
@@ -19,6 +20,7 @@ pub use dielectric::{Dielectric, Null, ThinDielectric};
 pub use diffuse::Diffuse;
 pub use microfacet::{Microfacet, Shape};
 pub use plastic::{Base, Plastic};
+pub use principled::{Principled, PrincipledThin};
 pub use rough_dielectric::RoughDielectric;
 pub use rough_plastic::{Coat, RoughPlastic};
 
@@ -80,10 +82,12 @@ pub enum Bsdf {
     RoughDielectric(RoughDielectric),
     Plastic(Plastic),
     RoughPlastic(RoughPlastic),
+    Principled(Principled),
+    PrincipledThin(PrincipledThin),
     Null(Null),
 }
 
-const _: () = assert!(size_of::<Bsdf>() <= 64);
+const _: () = assert!(size_of::<Bsdf>() <= 76);
 
 impl Bsdf {
     /// f(wo, wi) in 1/sr, without cosine. Delta lobes contribute nothing.
@@ -101,6 +105,8 @@ impl Bsdf {
             Bsdf::RoughDielectric(b) => b.eval_pdf(wo, wi, Mode::Radiance).1,
             Bsdf::Plastic(b) => b.eval_pdf(wo, wi).1,
             Bsdf::RoughPlastic(b) => b.eval_pdf(wo, wi).1,
+            Bsdf::Principled(b) => b.eval_pdf(wo, wi, Mode::Radiance).1,
+            Bsdf::PrincipledThin(b) => b.eval_pdf(wo, wi, Mode::Radiance).1,
             Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Null(_) => {
                 0.0
             }
@@ -116,6 +122,8 @@ impl Bsdf {
             Bsdf::RoughDielectric(b) => b.eval_pdf(wo, wi, mode),
             Bsdf::Plastic(b) => b.eval_pdf(wo, wi),
             Bsdf::RoughPlastic(b) => b.eval_pdf(wo, wi),
+            Bsdf::Principled(b) => b.eval_pdf(wo, wi, mode),
+            Bsdf::PrincipledThin(b) => b.eval_pdf(wo, wi, mode),
             Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Null(_) => {
                 (Rgb::BLACK, 0.0)
             }
@@ -135,6 +143,8 @@ impl Bsdf {
             Bsdf::RoughDielectric(b) => b.sample(wo, u_lobe, u, mode),
             Bsdf::Plastic(b) => b.sample(wo, u_lobe, u),
             Bsdf::RoughPlastic(b) => b.sample(wo, u_lobe, u),
+            Bsdf::Principled(b) => b.sample(wo, u_lobe, u, mode),
+            Bsdf::PrincipledThin(b) => b.sample(wo, u_lobe, u, mode),
             Bsdf::Null(b) => b.sample(wo),
         }
     }
@@ -158,6 +168,8 @@ impl Bsdf {
                 | Bsdf::RoughDielectric(_)
                 | Bsdf::Plastic(_)
                 | Bsdf::RoughPlastic(_)
+                | Bsdf::Principled(_)
+                | Bsdf::PrincipledThin(_)
         )
     }
 
@@ -195,6 +207,8 @@ impl Bsdf {
             Bsdf::RoughDielectric(b) => b.albedo(wo),
             Bsdf::Plastic(b) => b.albedo(wo),
             Bsdf::RoughPlastic(b) => b.albedo(wo),
+            Bsdf::Principled(b) => b.albedo(wo),
+            Bsdf::PrincipledThin(b) => b.albedo(wo),
             Bsdf::Null(b) => b.transmittance,
         }
     }

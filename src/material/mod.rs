@@ -1,10 +1,12 @@
 //! Materials: from a hit, by way of textures, to the numbers of a [`Bsdf`].
 
 mod dielectrics;
+mod principled;
 mod relief;
 mod shading;
 
 pub use dielectrics::{Coated, Glass};
+pub use principled::{BaseTextures, PrincipledTextures, ThinTextures};
 pub use relief::{Map, Relief};
 pub use shading::Shading;
 
@@ -55,6 +57,8 @@ pub enum Material {
         relief: Box<Relief>,
         inside: Box<Material>,
     },
+    Principled(Box<PrincipledTextures>),
+    PrincipledThin(Box<ThinTextures>),
     /// One-sided materials for the front and the back, each as if its side were the front.
     TwoSided {
         front: Box<Material>,
@@ -185,10 +189,23 @@ impl Material {
             Material::ThinDielectric(glass) => glass.thin(at),
             Material::RoughDielectric { glass, roughness } => glass.rough(roughness, at),
             Material::Coated(coated) => coated.at(at),
+            Material::Principled(p) => p.at(at),
+            Material::PrincipledThin(p) => p.at(at),
             Material::TwoSided { front: inside, .. }
             | Material::Mask { inside, .. }
             | Material::Relief { inside, .. } => inside.bsdf(at),
             Material::Blend { parts, .. } => parts[0].bsdf(at),
+        }
+    }
+
+    /// Whether a principled material that light goes through is somewhere in the material.
+    pub fn is_clear(&self) -> bool {
+        match self {
+            Material::Principled(m) => m.base.is_clear(),
+            Material::TwoSided { front, back } => front.is_clear() || back.is_clear(),
+            Material::Mask { inside, .. } | Material::Relief { inside, .. } => inside.is_clear(),
+            Material::Blend { parts, .. } => parts.iter().any(Material::is_clear),
+            _ => false,
         }
     }
 
@@ -229,6 +246,11 @@ impl Material {
             Material::Mask { inside, .. } => inside.follows_tangents(),
             Material::Blend { parts, .. } => parts.iter().any(Material::follows_tangents),
             Material::Relief { .. } => true,
+            Material::Uniform(Bsdf::Principled(b))
+            | Material::UniformBothSides(Bsdf::Principled(b)) => b.base.is_anisotropic(),
+            Material::Uniform(Bsdf::PrincipledThin(b)) => b.base.is_anisotropic(),
+            Material::Principled(p) => p.base.is_anisotropic(),
+            Material::PrincipledThin(p) => p.base.is_anisotropic(),
             _ => false,
         }
     }
@@ -309,6 +331,8 @@ impl Material {
                 roughness: r,
             } => [glass.textures(), vec![&r.alpha_u, &r.alpha_v]].concat(),
             Material::Coated(coated) => coated.textures(),
+            Material::Principled(p) => p.textures(),
+            Material::PrincipledThin(p) => p.textures(),
         }
     }
 }

@@ -30,8 +30,6 @@ const TABLE: &[(Category, &[&str], &str)] = &[
     (
         Bsdf,
         &[
-            "principled",
-            "principledthin",
             "pplastic",
             "phong",
             "ward",

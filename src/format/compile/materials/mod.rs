@@ -18,6 +18,7 @@ use super::suggest;
 mod attribute;
 mod composed;
 mod dielectrics;
+mod principled;
 mod textures;
 
 pub struct Materials<'a> {
@@ -121,9 +122,9 @@ impl<'a> Materials<'a> {
                 let [Some(first), last] = [sides.first(), sides.last()] else {
                     return Err(p.error("\"twosided\" needs a material inside"));
                 };
-                let front = Box::new(self.material(first)?);
+                let front = Box::new(self.one_sided(first)?);
                 let back = match last {
-                    Some(last) if sides.len() == 2 => Box::new(self.material(last)?),
+                    Some(last) if sides.len() == 2 => Box::new(self.one_sided(last)?),
                     _ => front.clone(),
                 };
                 Material::TwoSided { front, back }
@@ -145,6 +146,8 @@ impl<'a> Materials<'a> {
             "null" => Material::Uniform(Bsdf::Null(Null {
                 transmittance: Rgb::WHITE,
             })),
+            "principled" => self.principled(p)?,
+            "principledthin" => self.principled_thin(p)?,
             _ => Material::Diffuse {
                 reflectance: self.reflectance(p, "reflectance")?,
             },
@@ -170,6 +173,21 @@ impl<'a> Materials<'a> {
             anisotropic: p.is_given("alpha_u"),
             visible: p.bool("sample_visible")?,
         })
+    }
+
+    /// A material for one side of a surface: nothing goes through it.
+    fn one_sided(&mut self, p: &Props<'a>) -> Result<Material, SceneError> {
+        let material = self.material(p)?;
+        match material.is_clear() {
+            true => {
+                let error = p.error_at(
+                    "spec_trans",
+                    "what light goes through already has two sides",
+                );
+                Err(error.with_help("leave out spec_trans, or \"twosided\" around the material"))
+            }
+            false => Ok(material),
+        }
     }
 
     fn metal(&mut self, p: &Props<'a>) -> Result<Metal, SceneError> {
