@@ -3,6 +3,7 @@
 mod compiling;
 mod files;
 mod language;
+mod meshes;
 mod outside;
 mod values;
 
