@@ -134,8 +134,8 @@ mod tests {
             assert!((t - mean).abs() < 1e-6, "{eta}: {t} {mean}");
         }
         for eta in [1e-6f64, 1e6] {
-            // 8 / (3 n) of the light passes where n is large (the leading terms of the closed form).
-            let few = 8.0 / 3.0 * eta.min(1.0 / eta) * (eta * eta).min(1.0);
+            // 16 / (3 n) of the light passes where n is large: 4 cos / n and 4 / (n cos) of the two polarisations.
+            let few = 16.0 / 3.0 * eta.min(1.0 / eta) * (eta * eta).min(1.0);
             assert!((diffuse_through(eta) / few - 1.0).abs() < 1e-3, "{eta}");
         }
         assert!(diffuse_through(1.0 + 1e-7) > 1.0 - 1e-6);

@@ -225,7 +225,11 @@ a.xml:3:57: "alpha" of bsdf "roughplastic" cannot be a texture
         building(
             "<sensor type='perspective'/>\n<shape type='sphere'><bsdf type='null'><rgb name='transmittance' value='1'/></bsdf></shape>",
         ),
-        r#"NULL"#,
+        r#"
+a.xml:3:45: unknown parameter "transmittance" of bsdf "null"
+  <shape type='sphere'><bsdf type='null'><rgb name='transmittance' value='1'/></bsdf></shape>
+                                              ^
+  help: bsdf "null" has no parameters"#,
     );
 }
 
