@@ -32,7 +32,7 @@ impl RoughDielectric {
     pub(super) fn eval_pdf(&self, wo: Vec3, wi: Vec3, mode: Mode) -> (Rgb, f32) {
         // Turned such that `wo` lies above the surface: facets have no tangent direction of their own.
         let (eta, wo, wi) = self.seen_from_above(wo, wi);
-        if !(wo.z > 0.0) || wi.z == 0.0 {
+        if wo.z <= 0.0 || wi.z == 0.0 {
             return (Rgb::BLACK, 0.0);
         }
         if wi.z > 0.0 {
@@ -60,7 +60,7 @@ impl RoughDielectric {
     #[inline]
     pub(super) fn sample(&self, wo: Vec3, u_lobe: f32, u: Vec2, mode: Mode) -> Option<BsdfSample> {
         let (eta, up, _) = self.seen_from_above(wo, wo);
-        if !(up.z > 0.0) {
+        if up.z <= 0.0 {
             return None;
         }
         let m = self.chosen_from(up).sample(up, u);
