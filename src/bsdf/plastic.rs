@@ -33,16 +33,15 @@ pub struct Base {
 impl Base {
     /// Under a smooth boundary of index ratio `eta` (inside over outside, > 0).
     pub fn smooth(eta: f32, nonlinear: bool) -> Base {
-        // The share that gets through in one direction is eta² of that in the other, by reciprocity.
-        let entering = 1.0 - fresnel::diffuse_light(f64::from(eta));
+        // What gets in is eta² times what gets out: this is the latter, times eta².
         Base {
             eta2: eta * eta,
-            leaving: entering as f32,
+            leaving: fresnel::diffuse_through(f64::from(eta)) as f32,
             nonlinear,
         }
     }
 
-    /// Under a boundary that lets the share `leaves` (0..1) of diffuse light from inside through.
+    /// Under a boundary that lets the share `leaves` (above 0, to 1) of diffuse light from inside through.
     pub(super) fn new(eta: f32, leaves: f32, nonlinear: bool) -> Base {
         Base {
             eta2: eta * eta,
@@ -148,7 +147,7 @@ impl Plastic {
 
     /// Share of diffuse light that enters.
     fn entering(&self) -> f32 {
-        (1.0 - fresnel::diffuse_light(f64::from(self.eta))) as f32
+        fresnel::diffuse_through(f64::from(self.eta)) as f32
     }
 
     /// Share of the light from `wo` that leaves again.

@@ -32,7 +32,7 @@ impl RoughDielectric {
     pub(super) fn eval_pdf(&self, wo: Vec3, wi: Vec3, mode: Mode) -> (Rgb, f32) {
         // Turned such that `wo` lies above the surface: facets have no tangent direction of their own.
         let (eta, wo, wi) = self.seen_from_above(wo, wi);
-        if !(wo.z > 0.0) || wi.z == 0.0 {
+        if wo.z <= 0.0 || wi.z == 0.0 {
             return (Rgb::BLACK, 0.0);
         }
         if wi.z > 0.0 {
@@ -60,7 +60,7 @@ impl RoughDielectric {
     #[inline]
     pub(super) fn sample(&self, wo: Vec3, u_lobe: f32, u: Vec2, mode: Mode) -> Option<BsdfSample> {
         let (eta, up, _) = self.seen_from_above(wo, wo);
-        if !(up.z > 0.0) {
+        if up.z <= 0.0 {
             return None;
         }
         let m = self.chosen_from(up).sample(up, u);
@@ -86,7 +86,8 @@ impl RoughDielectric {
             let pdf = r * self.reflected_pdf(up, m, cos);
             (wi, self.surface.reflectance * weight, pdf, 1.0)
         } else {
-            let wi = (cos / eta - cos_t) * m - up / eta;
+            // The part along the facet is short when it is stretched much, so it comes first.
+            let wi = ((cos * m - up) / eta - cos_t * m).normalize();
             let pdf = (1.0 - r) * self.refracted_pdf(up, &facet, eta);
             let scale = weight * radiance_scale(eta, mode);
             (wi, self.surface.transmittance * scale, pdf, eta)
@@ -198,12 +199,16 @@ fn refracting_facet(wo: Vec3, wi: Vec3, eta: f32) -> Option<Facet> {
     if !(m.z > 0.0 && cos > 0.0 && below < 0.0) {
         return None;
     }
-    let (r, cos_t) = fresnel::dielectric(cos.min(1.0), eta);
+    // From the thinner side: on the other the angle next to the critical one has lost its digits.
+    let (r, _) = match eta > 1.0 {
+        true => fresnel::dielectric(cos.min(1.0), eta),
+        false => fresnel::dielectric((-below).min(1.0), 1.0 / eta),
+    };
     Some(Facet {
         m,
         cos,
         r,
-        cos_t,
+        cos_t: -below,
         length,
     })
 }

@@ -83,10 +83,14 @@ impl Coat {
             leaves += cos * kept;
             entering += cos * t;
         }
+        let (leaves, entering) = (leaves / cosines, entering / cosines);
+        // Where next to nothing leaves, rounding must not make that nothing: what enters could leave by the
+        // way it came, and a boundary of the largest index lets 1e-18 out.
+        let least = (entering / f64::from(eta * eta)).max(1e-18);
         Coat {
             through,
-            leaves: (leaves / cosines) as f32,
-            entering: (entering / cosines) as f32,
+            leaves: leaves.max(least).min(1.0) as f32,
+            entering: entering as f32,
         }
     }
 

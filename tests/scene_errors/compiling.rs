@@ -186,6 +186,54 @@ a.xml:3:50: "dielectric" already has two sides
 }
 
 #[test]
+fn glass_and_plastic() {
+    for plugin in ["thindielectric", "roughdielectric", "null"] {
+        let body = format!(
+            "<sensor type='perspective'/>\n<shape type='sphere'><bsdf type='twosided'><bsdf type='{plugin}'/></bsdf></shape>"
+        );
+        says(
+            building(&body),
+            &format!(
+                r#"
+a.xml:3:50: "{plugin}" already has two sides
+  <shape type='sphere'><bsdf type='twosided'><bsdf type='{plugin}'/></bsdf></shape>
+                                                   ^
+  help: use it without "twosided" around it"#
+            ),
+        );
+    }
+    says(
+        building(
+            "<sensor type='perspective'/>\n<shape type='sphere'><bsdf type='roughdielectric'><float name='alpha_v' value='0.1'/></bsdf></shape>",
+        ),
+        r#"
+a.xml:3:28: alpha_u and alpha_v come together
+  <shape type='sphere'><bsdf type='roughdielectric'><float name='alpha_v' value='0.1'/></bsdf></shape>
+                             ^
+  help: give both, or alpha alone"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<shape type='sphere'><bsdf type='roughplastic'><texture name='alpha' type='checkerboard'/></bsdf></shape>",
+        ),
+        r#"
+a.xml:3:57: "alpha" of bsdf "roughplastic" cannot be a texture
+  <shape type='sphere'><bsdf type='roughplastic'><texture name='alpha' type='checkerboard'/></bsdf></shape>
+                                                          ^"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<shape type='sphere'><bsdf type='null'><rgb name='transmittance' value='1'/></bsdf></shape>",
+        ),
+        r#"
+a.xml:3:45: unknown parameter "transmittance" of bsdf "null"
+  <shape type='sphere'><bsdf type='null'><rgb name='transmittance' value='1'/></bsdf></shape>
+                                              ^
+  help: bsdf "null" has no parameters"#,
+    );
+}
+
+#[test]
 fn emitters() {
     says(
         building(

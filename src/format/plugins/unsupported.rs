@@ -9,7 +9,7 @@ const METHOD: &str = "use the integrator \"path\"";
 const DERIVATIVE: &str = "luxel computes no derivatives; use the integrator \"path\"";
 const RGB: &str = "luxel renders in RGB; write the colour with <rgb>";
 const BAKE: &str = "bake the texture into an image and use the texture \"bitmap\"";
-const NEAR_BSDF: &str = "use the nearest of diffuse, conductor, roughconductor and dielectric";
+const NEAR_BSDF: &str = "use the nearest of diffuse, plastic, roughplastic, conductor, roughconductor, dielectric and roughdielectric";
 
 const TABLE: &[(Category, &[&str], &str)] = &[
     (
