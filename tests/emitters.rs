@@ -338,7 +338,7 @@ fn textured_surfaces_light_as_much_as_they_are_seen_to() {
         let (shape, radiance) = (ShapeId(0), spotted(turned_uv()));
         let lights = Lights::new(vec![Emitter::TexturedArea { shape, radiance }], &geoms);
         let from = receiver(Vec3::ZERO, Vec3::Z);
-        let truth = irradiance_by_rays(&lights, &geoms, 700);
+        let truth = irradiance_by_rays(&lights, &geoms, 500);
         let mut rng = Rng::new(6);
         let (mut sum, mut sum2, n) = (0f64, 0f64, 500_000);
         for _ in 0..n {
