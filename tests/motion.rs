@@ -1,8 +1,11 @@
 //! Maps that move over the shutter, and cameras that do.
 
 mod common;
+#[path = "common/render.rs"]
+mod render;
 
 use common::Rng;
+use luxel::film::Film;
 use luxel::math::{Aabb, DVec3, Motion, Transform, Vec3};
 
 fn translate(x: f64, y: f64, z: f64) -> Transform {
@@ -280,4 +283,161 @@ fn motions_compose() {
             assert!(near(at.inverse().point(at.point(x)), x));
         }
     }
+}
+
+/// A small ball of light at distance 4 on the z axis, seen from the origin by a camera whose `to_world` is
+/// `moving`.
+fn ball_of_light(sensor: &str, moving: &str) -> String {
+    format!(
+        r#"<scene version="3.0.0">
+            <integrator type="path"><integer name="max_depth" value="1"/></integrator>
+            <sensor type="{sensor}"{moving}
+                <film type="hdrfilm">
+                    <integer name="width" value="64"/><integer name="height" value="16"/>
+                    <rfilter type="box"/>
+                </film>
+            </sensor>
+            <shape type="sphere"><point name="center" x="0" y="0" z="4"/><float name="radius" value="{RADIUS}"/>
+                <emitter type="area"><rgb name="radiance" value="1000"/></emitter>
+            </shape>
+        </scene>"#
+    )
+}
+
+const RADIUS: f64 = 0.1;
+
+/// Sum of the light, and mean and variance of its place along x, in pixels.
+fn streak(xml: &str) -> [f64; 3] {
+    let (film, _): (Film, _) = render::render(&render::compile(xml), 2048);
+    let picture = film.mean();
+    let sum: f64 = picture.iter().map(|p| p[0]).sum();
+    let mean_of = |f: &dyn Fn(f64) -> f64| {
+        let terms = picture.iter().enumerate();
+        terms
+            .map(|(i, p)| p[0] * f((i % 64) as f64 + 0.5))
+            .sum::<f64>()
+            / sum
+    };
+    let mean = mean_of(&|x| x);
+    [sum, mean, mean_of(&|x| (x - mean).powi(2))]
+}
+
+#[track_caller]
+fn assert_streak(found: [f64; 3], expected: [f64; 3]) {
+    let near = |i: usize, share: f64| (found[i] / expected[i] - 1.0).abs() < share;
+    let good = near(0, 0.01) && (found[1] - expected[1]).abs() < 0.1 && near(2, 0.01);
+    assert!(good, "{found:?} {expected:?}");
+}
+
+#[test]
+fn a_moving_camera_draws_a_straight_streak() {
+    let animation = r#"><float name="shutter_open" value="2"/><float name="shutter_close" value="4"/>
+        <animation name="to_world">
+            <transform time="0"><translate x="-3"/></transform>
+            <transform time="6"><translate x="3"/></transform>
+        </animation>"#;
+    // Over the shutter the camera goes from -1 to 1; +x is to the left, so the light goes right.
+    let (pixel, own) = (2.0 / 64.0, RADIUS * RADIUS / 4.0);
+    let xml = ball_of_light("orthographic", animation);
+    let light = 1000.0 * std::f64::consts::PI * RADIUS * RADIUS / (pixel * pixel);
+    // From -0.5 to 0.75: the light stays within the picture.
+    let xml = xml.replace(r#"open" value="2"#, r#"open" value="2.5"#);
+    let xml = xml.replace(r#"close" value="4"#, r#"close" value="3.75"#);
+    let variance = (1.25f64.powi(2) / 12.0 + own) / (pixel * pixel) + 1.0 / 12.0;
+    assert_streak(streak(&xml), [light, 32.0 + 0.125 / pixel, variance]);
+
+    // The same from a pinhole: at depth 4 the picture is 8 tan wide.
+    let fov = r#"><float name="fov" value="40"/>"#;
+    let xml = ball_of_light("perspective", &animation.replacen('>', fov, 1));
+    let pixel = 8.0 * 20f64.to_radians().tan() / 64.0;
+    let [_, mean, variance] = streak(&xml);
+    assert!((mean - 32.0).abs() < 0.1, "{mean}");
+    let expected = (4.0 / 12.0 + own) / (pixel * pixel) + 1.0 / 12.0;
+    assert!(
+        (variance / expected - 1.0).abs() < 0.01,
+        "{variance} {expected}"
+    );
+}
+
+/// Turning by a constant rate, the light is at `tan a` of unit depth, where its image is larger by
+/// `1 / cos^3 a` than straight ahead.
+#[test]
+fn a_turning_camera_draws_a_streak_of_tangents() {
+    let (a, b) = ((-5f64).to_radians(), 20f64.to_radians());
+    let animation = r#"><float name="fov" value="60"/><float name="shutter_close" value="1"/>
+        <animation name="to_world">
+            <transform time="0"><rotate y="1" angle="-5"/></transform>
+            <transform time="1"><rotate y="1" angle="20"/></transform>
+        </animation>"#;
+    let xml = ball_of_light("perspective", animation);
+    let found = streak(&xml);
+    // Moments of tan over the angle with weight 1 / cos^3, by Simpson's rule.
+    let n = 1000;
+    let moment = |f: &dyn Fn(f64) -> f64| {
+        let term = |i: i32| {
+            let weight = match i {
+                0 => 1.0,
+                i if i == n => 1.0,
+                i if i % 2 == 1 => 4.0,
+                _ => 2.0,
+            };
+            let angle: f64 = a + (b - a) * f64::from(i) / f64::from(n);
+            weight * f(angle.tan()) / angle.cos().powi(3)
+        };
+        (0..=n).map(term).sum::<f64>() / (3.0 * f64::from(n))
+    };
+    let pixel = 2.0 * 30f64.to_radians().tan() / 64.0;
+    let sin = RADIUS / 4.0;
+    let solid_angle = 2.0 * std::f64::consts::PI * (1.0 - (1.0 - sin * sin).sqrt());
+    let weight = moment(&|_| 1.0);
+    let mean = moment(&|t| t) / weight;
+    let variance = moment(&|t| (t - mean).powi(2)) / weight;
+    // Turned to the left (+x), it sees the light on the right.
+    let expected = [
+        1000.0 * solid_angle * weight / (pixel * pixel),
+        32.0 + mean / pixel,
+        (variance + sin * sin / 4.0) / (pixel * pixel) + 1.0 / 12.0,
+    ];
+    assert_streak(found, expected);
+}
+
+#[test]
+fn equal_keyframes_are_the_still_camera_bit_for_bit() {
+    let scene =
+        include_str!("../scenes/cornell-balls.xml").replace(r#"value="512""#, r#"value="16""#);
+    let (start, end) = (
+        scene.find("<transform name=\"to_world\">").unwrap(),
+        "</transform>",
+    );
+    let end = start + scene[start..].find(end).unwrap() + end.len();
+    let still = &scene[start..end];
+    let shutter = |moving: &str| {
+        let open =
+            r#"<float name="shutter_open" value="1"/><float name="shutter_close" value="3"/>"#;
+        scene.replacen(still, &format!("{open}{moving}"), 1)
+    };
+    let key = |time: f64, more: &str| {
+        let steps = still
+            .replace("<transform name=\"to_world\">", "")
+            .replace("</transform>", more);
+        format!("<transform time=\"{time}\">{steps}</transform>")
+    };
+    let picture = |xml: &str| render::picture(xml, 8, 0);
+    let expected = picture(&scene);
+    let same = format!(
+        "<animation name=\"to_world\">{}{}</animation>",
+        key(0.0, ""),
+        key(2.0, "")
+    );
+    assert!(picture(&shutter(still)) == expected);
+    assert!(picture(&shutter(&same)) == expected);
+    let moved = key(2.0, "<translate x=\"0.1\"/>");
+    let moving = format!(
+        "<animation name=\"to_world\">{}{moved}</animation>",
+        key(0.0, "")
+    );
+    assert!(picture(&shutter(&moving)) != expected);
+    // Closed at once, it is a photograph of the moment.
+    let at_once = scene.replacen(still, &moving, 1);
+    assert!(picture(&at_once) == expected);
 }

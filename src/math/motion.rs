@@ -385,7 +385,7 @@ fn polar(m: DMat3) -> Option<(DMat3, DMat3)> {
         }
     }
     if q.determinant() < 0.0 {
-        q = q * -1.0;
+        q *= -1.0;
     }
     let s = q.transpose() * m;
     let s = (s + s.transpose()) * 0.5;

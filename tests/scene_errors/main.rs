@@ -1,5 +1,6 @@
 //! The full text of each error that a scene can cause.
 
+mod cameras;
 mod compiling;
 mod emitters;
 mod files;
