@@ -6,12 +6,14 @@
 pub mod accel;
 pub mod analytic;
 pub mod mesh;
+pub mod sdf;
 pub mod wide;
 pub mod world;
 
 pub use accel::{Accel, Hooks, MeshRef};
 pub use analytic::{Cylinder, Disk, Sphere};
 pub use mesh::{Mesh, MeshError};
+pub use sdf::{Sdf, SdfGrid};
 pub use world::{Deforming, GroupId, PlaceId, Placement, World};
 
 use crate::math::{Aabb, Frame, Vec2, Vec3, fp, warp};
@@ -152,6 +154,8 @@ pub enum Geometry {
     Cylinder(Cylinder),
     /// A mesh that changes its form over the shutter.
     Deforming(Deforming),
+    /// Gives no light: it has no area to sample.
+    Sdf(Sdf),
 }
 
 impl Geometry {
@@ -162,9 +166,11 @@ impl Geometry {
             Geometry::Disk(s) => s.bounds(),
             Geometry::Cylinder(s) => s.bounds(),
             Geometry::Deforming(s) => s.bounds(),
+            Geometry::Sdf(s) => s.bounds(),
         }
     }
 
+    /// Area, 0 for a grid of distances.
     pub fn area(&self) -> f64 {
         match self {
             Geometry::Mesh(s) => s.area(),
@@ -172,6 +178,7 @@ impl Geometry {
             Geometry::Disk(s) => s.area(),
             Geometry::Cylinder(s) => s.area(),
             Geometry::Deforming(s) => s.area(),
+            Geometry::Sdf(_) => 0.0,
         }
     }
 
@@ -208,6 +215,7 @@ impl Geometry {
             Geometry::Sphere(s) => s.intersect(ray, t_max),
             Geometry::Disk(s) => s.intersect(ray, t_max),
             Geometry::Cylinder(s) => s.intersect(ray, t_max),
+            Geometry::Sdf(s) => s.intersect(ray, t_max),
         }
     }
 
@@ -221,6 +229,7 @@ impl Geometry {
             Geometry::Disk(s) => s.at_hit(ray),
             Geometry::Cylinder(s) => s.at_hit(ray, raw.t),
             Geometry::Deforming(s) => return s.hit(ray, raw, tangents),
+            Geometry::Sdf(s) => return s.hit(ray, raw),
         };
         Hit {
             p: point.p.as_vec3(),
@@ -245,6 +254,7 @@ impl Geometry {
             Geometry::Disk(s) => s.at_point(hit.p),
             Geometry::Cylinder(s) => s.at_point(hit.p),
             Geometry::Deforming(s) => return s.dp_duv(hit.prim, hit.time),
+            Geometry::Sdf(_) => return (Vec3::ZERO, Vec3::ZERO),
         };
         (point.dp_du.as_vec3(), point.dp_dv.as_vec3())
     }
@@ -252,7 +262,7 @@ impl Geometry {
     /// Texture coordinates at the point `p` of a shape that is no mesh; zero for one.
     pub fn uv_at(&self, p: Vec3) -> Vec2 {
         match self {
-            Geometry::Mesh(_) | Geometry::Deforming(_) => Vec2::ZERO,
+            Geometry::Mesh(_) | Geometry::Deforming(_) | Geometry::Sdf(_) => Vec2::ZERO,
             Geometry::Sphere(s) => s.at_point(p).uv,
             Geometry::Disk(s) => s.at_point(p).uv,
             Geometry::Cylinder(s) => s.at_point(p).uv,
@@ -268,6 +278,7 @@ impl Geometry {
             Geometry::Disk(s) => s.sample_area(u),
             Geometry::Cylinder(s) => s.sample_area(u),
             Geometry::Deforming(s) => s.surface_sample(prim, warp::triangle(u)),
+            Geometry::Sdf(s) => s.no_sample(),
         }
     }
 }

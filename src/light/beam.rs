@@ -30,7 +30,7 @@ pub(crate) fn has_feet(g: &Geometry) -> bool {
         Geometry::Sphere(s) => !s.inward(),
         Geometry::Cylinder(s) => !s.flip_normals(),
         Geometry::Disk(_) => true,
-        Geometry::Deforming(_) => false,
+        Geometry::Deforming(_) | Geometry::Sdf(_) => false,
     }
 }
 
@@ -47,7 +47,7 @@ fn is_flat(m: &Mesh, prim: u32) -> bool {
 pub(super) fn foot(part: &Part, g: &Geometry, from: &Hit) -> Option<Foot> {
     let eye = from.p;
     match g {
-        Geometry::Deforming(_) => None,
+        Geometry::Deforming(_) | Geometry::Sdf(_) => None,
         Geometry::Mesh(m) => part.prims().find_map(|prim| on_triangle(m, prim, eye)),
         Geometry::Disk(s) => along(g, from, -s.normal().as_dvec3(), |_| 1.0),
         Geometry::Sphere(s) => {

@@ -239,7 +239,7 @@ fn plan_of_world(plan: &mut Plan, world: &World) {
         true => plan.add(
             "shapes",
             "triangles and exact shapes in one tree",
-            "there are spheres, disks or cylinders",
+            "there are spheres, disks, cylinders or grids of distances",
         ),
         false => plan.add("shapes", "triangles only", "no shape is anything else"),
     }

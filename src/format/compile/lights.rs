@@ -25,12 +25,14 @@ pub fn lights<'a>(
     let mut emitters = Vec::new();
     let mut used = HashSet::new();
     for (i, shape) in shapes.iter().enumerate() {
+        materials.enter(Some(shape));
         for emitter in shape.children(Category::Emitter) {
             used.insert(emitter.object_id());
             let shape = ShapeId(i as u32);
             emitters.push(surface(&emitter, shape, world, materials)?);
         }
     }
+    materials.enter(None);
     let mut environment: Option<Props> = None;
     for emitter in root.children(Category::Emitter) {
         if is_surface(&emitter) {

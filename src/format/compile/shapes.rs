@@ -1,11 +1,15 @@
 //! Shapes: files are read and placed in the coordinates of the world, or of a group, in f64; only when
 //! their centre is known are coordinates rounded, relative to it.
 
+use std::sync::Arc;
+
 use crate::format::mesh_io::{self, MeshData};
+use crate::format::plugins::Category;
 use crate::format::{Props, SceneError};
-use crate::geom::{Cylinder, Deforming, Disk, Geometry, Mesh, Sphere};
+use crate::geom::{Cylinder, Deforming, Disk, Geometry, Mesh, Sdf, SdfGrid, Sphere};
 use crate::math::{DVec3, Transform, Vec3};
 
+use super::attributes::{self, Attributes};
 use super::{out_of_reach, within_reach};
 
 /// A shape whose place in the world, or in its group, is known but not yet rounded.
@@ -29,6 +33,10 @@ enum Kind {
     Sphere,
     Disk,
     Cylinder,
+    Sdf {
+        grid: Arc<SdfGrid>,
+        smooth: bool,
+    },
 }
 
 impl<'a> Source<'a> {
@@ -66,13 +74,15 @@ pub fn read<'a>(
             to_world = to_world * along_axis(props)?;
             Kind::Cylinder
         }
+        "sdfgrid" => sdf(props)?,
         _ => mesh(props, &to_world, time_passes)?,
     };
     Ok(Source {
         props: *props,
         kind,
         to_world,
-        flip_normals: props.bool("flip_normals")?,
+        // The sign of its distances says where a grid has its outside.
+        flip_normals: props.plugin() != "sdfgrid" && props.bool("flip_normals")?,
     })
 }
 
@@ -110,6 +120,22 @@ fn along_axis(props: &Props) -> Result<Transform, SceneError> {
         .ok_or_else(|| props.error_at("radius", "the radius is too small for the length"))
 }
 
+/// A grid of distances from a file.
+fn sdf(props: &Props) -> Result<Kind, SceneError> {
+    if let Some(emitter) = props.child(Category::Emitter) {
+        let error = emitter.error("a \"sdfgrid\" cannot be an emitter");
+        return Err(error.with_help("use a mesh of the shape"));
+    }
+    let wrong = |what: String| props.error_at("filename", what);
+    let path = props.file("filename")?;
+    let data = mesh_io::read_grid(path).map_err(|e| wrong(e.to_string()))?;
+    let grid = SdfGrid::new(data.size, data.values);
+    Ok(Kind::Sdf {
+        grid: Arc::new(grid.map_err(|what| wrong(format!("{}: {what}", path.display())))?),
+        smooth: props.choice("normals")? == "smooth",
+    })
+}
+
 /// A mesh from a file, and the one that it has become when the shutter closes.
 fn mesh(props: &Props, to_world: &Transform, time_passes: bool) -> Result<Kind, SceneError> {
     let data = mesh_file(props, "filename", to_world)?;
@@ -127,9 +153,10 @@ fn mesh(props: &Props, to_world: &Transform, time_passes: bool) -> Result<Kind, 
 /// The mesh in the file that the parameter `name` gives, its positions and normals taken to the world.
 fn mesh_file(props: &Props, name: &str, to_world: &Transform) -> Result<MeshData, SceneError> {
     let path = props.file(name)?;
-    let flip_v = props.bool("flip_tex_coords")?;
+    let flip_v = props.plugin() != "serialized" && props.bool("flip_tex_coords")?;
     let data = match props.plugin() {
-        "ply" => mesh_io::read_ply(path),
+        "serialized" => mesh_io::read_serialized(path, props.int("shape_index")? as usize),
+        "ply" => mesh_io::read_ply(path, &attributes::wanted(props)),
         _ => mesh_io::read_obj(path),
     };
     let mut data = data.map_err(|e| props.error_at(name, e.to_string()))?;
@@ -151,6 +178,17 @@ fn mesh_file(props: &Props, name: &str, to_world: &Transform) -> Result<MeshData
         *n = to_world.normal(n.as_dvec3()).normalize_or_zero().as_vec3();
     }
     Ok(data)
+}
+
+/// Takes out what the meshes carry beside their geometry.
+pub fn take_attributes(sources: &mut [Source]) -> Attributes {
+    let mut all = Attributes::default();
+    for source in sources {
+        if let Kind::Mesh { data, .. } = &mut source.kind {
+            all.take(&source.props, data);
+        }
+    }
+    all
 }
 
 /// Least and greatest coordinates of a shape.
@@ -227,13 +265,16 @@ pub fn geometry(source: Source, center: DVec3) -> Result<Geometry, SceneError> {
         Kind::Sphere => Geometry::Sphere(Sphere::new(to_scene, flip_normals).ok_or_else(|| {
             refused("the transform makes the sphere an ellipsoid, which is not supported")
         })?),
+        Kind::Sdf { grid, smooth } => Geometry::Sdf(Sdf::new(grid, to_scene, smooth)),
         Kind::Disk => Geometry::Disk(Disk::new(to_scene, flip_normals)),
         Kind::Cylinder => {
-            Geometry::Cylinder(Cylinder::new(to_scene, flip_normals).ok_or_else(|| {
-                refused(
-                    "the transform makes the cylinder elliptic or oblique, which is not supported",
-                )
-            })?)
+            let cylinder = Cylinder::new(to_scene, flip_normals);
+            if !cylinder.is_even() && props.child(Category::Emitter).is_some() {
+                return Err(refused(
+                    "the transform makes the cylinder elliptic or oblique, which is not supported of an emitter",
+                ));
+            }
+            Geometry::Cylinder(cylinder)
         }
     })
 }

@@ -190,12 +190,20 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// Reads the shapes, chooses the centre of the scene and of each group, and makes all relative to it.
-    pub fn build(&self, plan: &mut Plan) -> Result<(World, DVec3), SceneError> {
+    /// Reads the shapes and their files.
+    pub fn read(&self) -> Result<Vec<Source<'a>>, SceneError> {
         let stands = self.shapes.par_iter().zip(&self.stands);
-        let sources: Vec<Source> = stands
+        stands
             .map(|(shape, (to_level, _))| shapes::read(shape, *to_level, self.time_passes))
-            .collect::<Result<_, SceneError>>()?;
+            .collect()
+    }
+
+    /// Chooses the centre of the scene and of each group, and makes what [`Layout::read`] gave relative to it.
+    pub fn place(
+        &self,
+        sources: Vec<Source>,
+        plan: &mut Plan,
+    ) -> Result<(World, DVec3), SceneError> {
         let mut top = Extent::EMPTY;
         let mut groups = vec![Extent::EMPTY; self.groups.len()];
         for (source, (_, group)) in sources.iter().zip(&self.stands) {

@@ -69,6 +69,38 @@ pub const PLUGINS: &[Plugin] = &[
         "Triangle mesh of a PLY file; smooth normals are computed if it has none.",
     ),
     shape(
+        "serialized",
+        &[
+            Param::file("filename", "The file of serialized meshes, version 3 or 4."),
+            Param::int(
+                "shape_index",
+                (0, i32::MAX as i64),
+                0,
+                "Which mesh of the file, from 0.",
+            ),
+            FACE,
+            FLIP,
+            TO_WORLD,
+            SILHOUETTE,
+        ],
+        "Triangle mesh of a file made by Mitsuba; smooth normals are computed if it has none.",
+    ),
+    shape(
+        "sdfgrid",
+        &[
+            Param::file("filename", "The grid of signed distances, a .vol file."),
+            Param::choice(
+                "normals",
+                &["smooth", "analytic"],
+                "smooth",
+                "Shade with normals that are smoothed between voxels, or with the exact ones.",
+            ),
+            TO_WORLD,
+            SILHOUETTE,
+        ],
+        "Where a grid of distances over the cube from (0, 0, 0) to (1, 1, 1) is zero; gives no light.",
+    ),
+    shape(
         "rectangle",
         &[FLIP, FACE, TO_WORLD, SILHOUETTE],
         "The square from (-1, -1, 0) to (1, 1, 0) with normal +z.",

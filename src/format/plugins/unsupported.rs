@@ -15,12 +15,10 @@ const TABLE: &[(Category, &[&str], &str)] = &[
     (
         Shape,
         &[
-            "serialized",
             "bsplinecurve",
             "linearcurve",
             "ellipsoids",
             "ellipsoidsmesh",
-            "sdfgrid",
             "heightfield",
             "hair",
             "deformable",
@@ -86,7 +84,6 @@ const TABLE: &[(Category, &[&str], &str)] = &[
     (
         Texture,
         &[
-            "mesh_attribute",
             "volume",
             "vertexcolors",
             "scale",

@@ -36,6 +36,7 @@ impl<'a> Materials<'a> {
                 }
                 Texture::Bitmap(bitmap)
             }
+            Texture::MeshAttribute(a) => Texture::MeshAttribute(self.share(p, name, a)),
             other => other,
         })
     }
@@ -43,7 +44,17 @@ impl<'a> Materials<'a> {
     pub(super) fn scalar(&mut self, p: &Props<'a>, name: &str) -> Result<Texture, SceneError> {
         match p.float_or_texture(name)? {
             FloatOrTexture::Float(v) => Ok(Texture::Constant(Rgb::splat(v as f32))),
-            FloatOrTexture::Texture(id) => self.texture(id),
+            FloatOrTexture::Texture(id) => {
+                let texture = self.texture(id)?;
+                self.check_scalar(id)?;
+                // What a picture of one colour was folded to is still a picture's.
+                Ok(match (texture, self.desc.object(id).plugin()) {
+                    (Texture::Constant(c), "bitmap") => {
+                        Texture::Constant(Rgb::splat(c.luminance()))
+                    }
+                    (texture, _) => texture,
+                })
+            }
         }
     }
 
@@ -59,7 +70,11 @@ impl<'a> Materials<'a> {
             return Ok(texture.clone());
         }
         let p = self.desc.object(id);
+        if p.plugin() == "mesh_attribute" {
+            return self.mesh_attribute(&p);
+        }
         let to_uv = affine2(&p.transform("to_uv")?);
+        let outer = std::mem::take(&mut self.per_shape);
         let texture = match p.plugin() {
             "checkerboard" => Texture::Checkerboard(Box::new(Checkerboard {
                 color0: self.reflectance(&p, "color0")?,
@@ -69,7 +84,10 @@ impl<'a> Materials<'a> {
             _ => self.bitmap(&p, to_uv)?,
         };
         let texture = texture.folded();
-        self.textures.insert(id, texture.clone());
+        if !self.per_shape {
+            self.textures.insert(id, texture.clone());
+        }
+        self.per_shape |= outer;
         Ok(texture)
     }
 

@@ -2,6 +2,8 @@
 //!
 //! Texel (0, 0) is the top left of the picture and lies at uv (0, 0); texel centres are at half-integers.
 
+mod attribute;
+
 use std::sync::{Arc, LazyLock};
 
 use glam::Affine2;
@@ -9,12 +11,15 @@ use glam::Affine2;
 use crate::image_io::color::srgb_to_linear;
 use crate::math::{Rgb, Vec2};
 
+pub use attribute::{AttributeValues, MeshAttribute};
+
 /// A colour as a function of the surface parameters.
 #[derive(Clone, Debug)]
 pub enum Texture {
     Constant(Rgb),
     Bitmap(Bitmap),
     Checkerboard(Box<Checkerboard>),
+    MeshAttribute(MeshAttribute),
 }
 
 /// A place on a surface, as textures see it.
@@ -35,13 +40,20 @@ impl Texture {
             Texture::Constant(c) => *c,
             Texture::Bitmap(b) => b.eval(at.uv),
             Texture::Checkerboard(c) => c.eval(at),
+            Texture::MeshAttribute(a) => a.eval(at),
         }
     }
 
-    /// The one number of a scalar texture: the luminance where it has a colour.
+    /// The one number of a scalar texture: where it has a colour, as in Mitsuba, the luminance of a
+    /// picture's and the mean of any other.
     #[inline]
     pub fn eval_scalar(&self, at: &At) -> f32 {
-        self.eval(at).luminance()
+        match self {
+            Texture::Constant(c) => mean(*c),
+            Texture::Bitmap(b) => b.eval(at.uv).luminance(),
+            Texture::Checkerboard(c) => c.at(at).eval_scalar(at),
+            Texture::MeshAttribute(a) => mean(a.eval(at)),
+        }
     }
 
     /// The same texture in its cheapest form: one that has a single colour becomes that colour.
@@ -49,6 +61,7 @@ impl Texture {
         let single = match &self {
             Texture::Constant(c) => Some(*c),
             Texture::Bitmap(b) => b.texels.single_color(),
+            Texture::MeshAttribute(a) => a.single_color(),
             Texture::Checkerboard(c) => match (&c.color0, &c.color1) {
                 (Texture::Constant(a), Texture::Constant(b)) if a == b => Some(*a),
                 _ => None,
@@ -62,6 +75,14 @@ impl Texture {
             Texture::Constant(c) => Some(*c),
             _ => None,
         }
+    }
+}
+
+/// Of three equal numbers exactly that number.
+fn mean(c: Rgb) -> f32 {
+    match c.r == c.g && c.g == c.b {
+        true => c.r,
+        false => (c.r + c.g + c.b) / 3.0,
     }
 }
 
@@ -199,12 +220,17 @@ pub struct Checkerboard {
 
 impl Checkerboard {
     fn eval(&self, at: &At) -> Rgb {
+        self.at(at).eval(at)
+    }
+
+    /// The texture of the square at a place.
+    fn at(&self, at: &At) -> &Texture {
         let p = self.to_uv.transform_point2(at.uv);
         let p = p - p.floor();
         if (p.x > 0.5) == (p.y > 0.5) {
-            self.color0.eval(at)
+            &self.color0
         } else {
-            self.color1.eval(at)
+            &self.color1
         }
     }
 }
@@ -303,6 +329,35 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn scalars_of_colours_match_measured_values() {
+        // Mitsuba 3.9.1: luminance of a picture, mean of a colour.
+        let texels = Texels::Floats(vec![[0.44723, 0.80453, 0.30388], [0.0; 3]]);
+        let picture = Bitmap {
+            texels: Arc::new(Picture {
+                width: 2,
+                height: 1,
+                texels,
+            }),
+            ..ramp(Interpolation::Nearest, Wrap::Repeat)
+        };
+        let picture = Texture::Bitmap(picture);
+        assert!((picture.eval_scalar(&At::default()) - 0.69241).abs() < 1e-4);
+        let board = Texture::Checkerboard(Box::new(Checkerboard {
+            color0: Texture::Constant(Rgb::new(0.1, 0.8, 0.3)),
+            color1: picture,
+            to_uv: Affine2::IDENTITY,
+        }));
+        assert!((board.eval_scalar(&At::default()) - 0.4).abs() < 1e-6);
+        let right = At {
+            uv: Vec2::new(0.7, 0.2),
+            ..At::default()
+        };
+        assert_eq!(board.eval_scalar(&right), 0.0);
+        let third = Texture::Constant(Rgb::splat(0.1));
+        assert_eq!(third.eval_scalar(&At::default()), 0.1);
     }
 
     #[test]
