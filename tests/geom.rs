@@ -235,7 +235,6 @@ fn off_surface(g: &Geometry, t: &Transform, hit: &Hit) -> f64 {
             let n = (b - a).cross(c - a).normalize();
             return n.dot(hit.p.as_dvec3() - a);
         }
-        Geometry::Sdf(_) => panic!("not among these"),
     }
 }
 

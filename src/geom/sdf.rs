@@ -165,9 +165,12 @@ impl Sdf {
         let p = (o + d * t).as_vec3();
         let (ng, ns) = match &meeting {
             Some(m) => self.normals(m),
-            None => (-ray.d, -ray.d),
+            None => {
+                let back = -ray.d.normalize_or(Vec3::Z);
+                (back, back)
+            }
         };
-        let f64_error = ((o.length() + t) * 16.0 * f64::EPSILON) as f32;
+        let f64_error = ((o.length() + t * d.length()) * 16.0 * f64::EPSILON) as f32;
         Hit {
             p,
             p_err: p.abs() * fp::gamma(3) + Vec3::splat(f64_error),
