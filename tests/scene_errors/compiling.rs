@@ -183,6 +183,38 @@ a.xml:3:50: "dielectric" already has two sides
                                                    ^
   help: use it without "twosided" around it"#,
     );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<shape type='sphere'><bsdf type='twosided'><bsdf type='principledthin'/></bsdf></shape>",
+        ),
+        r#"
+a.xml:3:50: "principledthin" already has two sides
+  <shape type='sphere'><bsdf type='twosided'><bsdf type='principledthin'/></bsdf></shape>
+                                                   ^
+  help: use it without "twosided" around it"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<shape type='sphere'><bsdf type='twosided'><bsdf type='principled'><float name='spec_trans' value='0.1'/></bsdf></bsdf></shape>",
+        ),
+        r#"
+a.xml:3:93: what light goes through already has two sides
+  <shape type='sphere'><bsdf type='twosided'><bsdf type='principled'><float name='spec_trans' value='0.1'/></bsdf></bsdf></shape>
+                                                                                              ^
+  help: leave out spec_trans, or "twosided" around the material"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<shape type='sphere'><bsdf type='principled'><float name='eta' value='1.5'/><float name='specular' value='0.5'/></bsdf></shape>",
+        ),
+        "",
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<shape type='sphere'><bsdf type='principled'><float name='specular' value='12.5'/></bsdf></shape>",
+        ),
+        "",
+    );
 }
 
 #[test]

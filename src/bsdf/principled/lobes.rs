@@ -16,6 +16,10 @@ const COAT_MASKING: f32 = 0.25;
 /// energy must stay within reach, or the picture would miss it.
 const RATE_MIN: f32 = 0.01;
 
+/// Added to what facets reflect, or let through, at their [`facet_cos`]: keeps a lobe within reach that would
+/// carry nothing at that angle, but does at others.
+pub(super) const MARGIN: f32 = 0.02;
+
 /// What both materials have: a colour, a roughness, and how the colour enters the lobes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Base {
@@ -110,8 +114,19 @@ impl Base {
     /// About the share of light that diffuse lobe and sheen together reflect: for choosing lobes.
     #[inline]
     pub(super) fn diffuse_share(&self, cos_o: f32) -> f32 {
-        self.color.mean() + 0.3 * self.sheen * schlick_weight(cos_o)
+        self.color.mean() + 0.3 * self.sheen * (schlick_weight(cos_o) + 0.01)
     }
+}
+
+/// About the cosine at which facets of this roughness are met from a direction of cosine `cos`: along the
+/// surface only those are seen that lean towards it. Within some per cent of the mean over visible normals,
+/// which is 2/3 at `cos` 0 and roughness 1.
+#[inline]
+pub(super) fn facet_cos(cos: f32, roughness: f32) -> f32 {
+    let c2 = sqr(cos);
+    (c2 + 0.45 * sqr(sqr(roughness)) * (1.0 - c2))
+        .clamp(0.0, 1.0)
+        .sqrt()
 }
 
 /// `(1 - cos)^5` (Schlick 1994, equation 15).

@@ -17,7 +17,7 @@ pub use thin::PrincipledThin;
 use super::{BsdfSample, Density, Mode};
 use crate::math::warp::{cosine_hemisphere, cosine_hemisphere_pdf};
 use crate::math::{Rgb, Vec2, Vec3, sqr};
-use lobes::{Coat, choose, half_vector, probabilities, schlick, tinted};
+use lobes::{Coat, MARGIN, choose, facet_cos, half_vector, probabilities, schlick, tinted};
 
 /// The surface of a solid body: metal, or a dielectric coat over a diffuse base or over clear matter, with
 /// sheen and a clear coat on the outside.
@@ -122,13 +122,13 @@ impl Principled {
     /// Probabilities of microfacets, clear coat and diffuse lobe.
     #[inline]
     fn probs(&self, cos: f32, outside: bool) -> [f32; 3] {
-        let at = self.interface(cos, outside);
+        let met = facet_cos(cos, self.base.roughness);
+        let at = self.interface(met, outside);
         let facets = at.reflect.mean() + at.transmit.mean();
         if !outside {
             return probabilities([facets, 0.0, 0.0]);
         }
-        // The reflectance rises on rough surfaces, whose facets are met at larger angles.
-        let facets = facets + 0.02 * self.base.roughness;
+        let facets = facets + MARGIN;
         // The masked lobe loses about a cosine on either side; long tails leave some at grazing angles.
         let coat = self.clearcoat
             * schlick(Rgb::splat(0.04), cos, cos, 2.0).r

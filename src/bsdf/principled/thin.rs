@@ -1,6 +1,6 @@
 //! The thin sheet: both sides alike, light that passes keeps its direction apart from the roughness.
 
-use super::lobes::{self, Base, choose, half_vector, probabilities, tinted};
+use super::lobes::{self, Base, MARGIN, choose, facet_cos, half_vector, probabilities, tinted};
 use super::{finish, usable};
 use crate::bsdf::{BsdfSample, Mode, fresnel};
 use crate::math::warp::{cosine_hemisphere, cosine_hemisphere_pdf};
@@ -58,14 +58,12 @@ impl PrincipledThin {
     #[inline]
     fn probs(&self, cos: f32) -> [f32; 4] {
         let [reflected, through] = self.diffuse_weights();
-        let (tint, _) = tinted(&self.base, cos, self.eta);
-        let (f, _) = fresnel::dielectric(cos, self.eta);
-        // The reflectance rises on rough surfaces, whose facets are met at larger angles.
-        let rise = 0.02 * self.base.roughness;
+        let (tint, _) = tinted(&self.base, facet_cos(cos, self.base.roughness), self.eta);
+        let (f, _) = fresnel::dielectric(facet_cos(cos, self.passed_roughness()), self.eta);
         let [a, b, c, d] = self.rates;
         probabilities([
-            a * self.spec_trans * (tint.mean() + rise),
-            b * self.spec_trans * (1.0 - f) * self.base.color.mean(),
+            a * self.spec_trans * (tint.mean() + MARGIN),
+            b * self.spec_trans * (1.0 - f + MARGIN) * self.base.color.mean(),
             c * reflected * self.base.diffuse_share(cos),
             d * through * self.base.color.mean(),
         ])
