@@ -41,7 +41,10 @@ impl Texture {
     /// The one number of a scalar texture: the luminance where it has a colour.
     #[inline]
     pub fn eval_scalar(&self, at: &At) -> f32 {
-        self.eval(at).luminance()
+        match self {
+            Texture::Checkerboard(c) => c.eval_scalar(at),
+            _ => self.eval(at).luminance(),
+        }
     }
 
     /// The same texture in its cheapest form: one that has a single colour becomes that colour.
@@ -198,13 +201,33 @@ pub struct Checkerboard {
 }
 
 impl Checkerboard {
-    fn eval(&self, at: &At) -> Rgb {
+    /// Whether `at` lies on a square like that at the origin.
+    #[inline]
+    fn is_first(&self, at: &At) -> bool {
         let p = self.to_uv.transform_point2(at.uv);
         let p = p - p.floor();
-        if (p.x > 0.5) == (p.y > 0.5) {
+        (p.x > 0.5) == (p.y > 0.5)
+    }
+
+    fn eval(&self, at: &At) -> Rgb {
+        if self.is_first(at) {
             self.color0.eval(at)
         } else {
             self.color1.eval(at)
+        }
+    }
+
+    /// As a scalar the squares have each other's numbers, and a colour counts by its mean: measured with
+    /// Mitsuba 3.9.1, whose scenes are to keep their pictures.
+    fn eval_scalar(&self, at: &At) -> f32 {
+        let square = if self.is_first(at) {
+            &self.color1
+        } else {
+            &self.color0
+        };
+        match square {
+            Texture::Constant(c) => c.mean(),
+            other => other.eval_scalar(at),
         }
     }
 }
@@ -228,6 +251,24 @@ mod tests {
             interpolation,
             wrap,
             to_uv: Affine2::IDENTITY,
+        }
+    }
+
+    /// Figures of Mitsuba 3.9.1.
+    #[test]
+    fn scalar_checkerboard_swaps_its_squares() {
+        let board = Texture::Checkerboard(Box::new(Checkerboard {
+            color0: Texture::Constant(Rgb::new(0.1, 0.5, 0.9)),
+            color1: Texture::Constant(Rgb::splat(0.8)),
+            to_uv: Affine2::IDENTITY,
+        }));
+        for (u, v, color, scalar) in [(0.2, 0.2, 0.1, 0.8), (0.7, 0.2, 0.8, 0.5)] {
+            let at = At {
+                uv: Vec2::new(u, v),
+                ..At::default()
+            };
+            assert_eq!(board.eval(&at).r, color);
+            assert!((board.eval_scalar(&at) - scalar).abs() < 1e-6);
         }
     }
 
