@@ -96,7 +96,8 @@ impl Bsdf {
         self.eval_pdf(wo, wi, mode).0
     }
 
-    /// Density per steradian with which [`Bsdf::sample`] returns `wi`. Delta lobes contribute nothing.
+    /// Density per steradian with which [`Bsdf::sample`] returns `wi` for radiance. Delta lobes contribute
+    /// nothing.
     #[inline]
     pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
         match self {

@@ -207,13 +207,19 @@ a.xml:3:93: what light goes through already has two sides
         building(
             "<sensor type='perspective'/>\n<shape type='sphere'><bsdf type='principled'><float name='eta' value='1.5'/><float name='specular' value='0.5'/></bsdf></shape>",
         ),
-        "",
+        r#"
+a.xml:3:84: bsdf "principled" takes either "eta" or "specular", not both; "eta" is at a.xml:3:53
+  <shape type='sphere'><bsdf type='principled'><float name='eta' value='1.5'/><float name='specular' value='0.5'/></bsdf></shape>
+                                                                                     ^"#,
     );
     says(
         building(
             "<sensor type='perspective'/>\n<shape type='sphere'><bsdf type='principled'><float name='specular' value='12.5'/></bsdf></shape>",
         ),
-        "",
+        r#"
+a.xml:3:47: "specular" must be a number from 0 to 12, not 12.5
+  <shape type='sphere'><bsdf type='principled'><float name='specular' value='12.5'/></bsdf></shape>
+                                              ^"#,
     );
 }
 
