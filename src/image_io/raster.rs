@@ -179,3 +179,19 @@ fn told(e: image::ImageError) -> String {
         e => e.to_string(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn radiance_files_of_other_programs_are_read() {
+        let pixels = [Rgb::new(0.5, 1.0, 2.0), Rgb::new(0.25, 0.125, 4.0)];
+        let ours = encode_hdr(2, 1, &pixels).unwrap();
+        let rest = ours.strip_prefix(b"#?RADIANCE").unwrap();
+        let theirs = [b"#?RGBE", rest].concat();
+        assert_eq!(decode(&theirs, Kind::Hdr), decode(&ours, Kind::Hdr));
+        assert!(decode(&ours, Kind::Hdr).is_ok());
+        assert!(decode(b"#?RGBE", Kind::Hdr).is_err());
+    }
+}

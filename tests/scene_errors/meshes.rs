@@ -136,7 +136,7 @@ a.xml:4:71: "color" is no name of an attribute
         r#"
 a.xml:4:71: the attribute "vertex_color" has 4 numbers, not 1 or 3
   <texture name='reflectance' type='mesh_attribute'><string name='name' value='vertex_color'/></texture>
-                                                                  ^"#,
+                                                                        ^"#,
     );
     says(
         on(PLY, "roughconductor", "alpha", "face_color"),
