@@ -31,7 +31,8 @@ fn check_smooth(name: &str, bsdf: Bsdf, wo: Vec3, seed: u64, tests: usize) {
 }
 
 const CELLS: [usize; 2] = [24, 32];
-const FINE: usize = 16;
+const FINE_BITS: u32 = 4;
+const FINE: usize = 1 << FINE_BITS;
 
 /// Where light passes, the density ends in steps (the facets at right angles to the surface), which rules
 /// out integrating it to the last digit: a plain grid over the rectangle `lo..hi`, in coordinates in which
@@ -55,15 +56,20 @@ fn check_grid(
             n += 1;
         }
     }
-    let step = [0, 1].map(|i| (hi[i] - lo[i]) / (CELLS[i] * FINE) as f64);
+    let step = [0, 1].map(|i| (hi[i] - lo[i]) / CELLS[i] as f64);
     let expected = |cell: usize| -> f64 {
-        let at = [cell / CELLS[1] * FINE, cell % CELLS[1] * FINE];
+        let at = [cell / CELLS[1], cell % CELLS[1]];
+        // Hammersley's points in both directions: no two share a coordinate, so that steps along an axis and
+        // narrow ridges are met as well.
         let point = |k: usize| {
-            let k = [at[0] + k / FINE, at[1] + k % FINE];
-            density([0, 1].map(|i| lo[i] + (k[i] as f64 + 0.5) * step[i]))
+            let fine = FINE as f64;
+            let [a, b] = [k / FINE, k % FINE];
+            let reversed = |i: usize| (i.reverse_bits() >> (usize::BITS - FINE_BITS)) as f64 + 0.5;
+            let inside = [a as f64 + reversed(b) / fine, b as f64 + reversed(a) / fine];
+            density([0, 1].map(|i| lo[i] + (at[i] as f64 + inside[i] / fine) * step[i]))
         };
         let sum: f64 = (0..FINE * FINE).map(point).sum();
-        sum * step[0] * step[1] * SAMPLES as f64
+        sum * step[0] * step[1] * (SAMPLES as f64 / (FINE * FINE) as f64)
     };
     let (mut chi2, mut dof, mut total, mut rare) = (0.0, 0.0, 0.0, [0.0; 2]);
     for (cell, &count) in counts.iter().enumerate() {

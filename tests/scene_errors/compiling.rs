@@ -217,9 +217,9 @@ a.xml:3:84: bsdf "principled" takes either "eta" or "specular", not both; "eta" 
             "<sensor type='perspective'/>\n<shape type='sphere'><bsdf type='principled'><float name='specular' value='12.5'/></bsdf></shape>",
         ),
         r#"
-a.xml:3:47: "specular" must be a number from 0 to 12, not 12.5
+a.xml:3:69: "specular" must be a number from 0 to 12, not 12.5
   <shape type='sphere'><bsdf type='principled'><float name='specular' value='12.5'/></bsdf></shape>
-                                              ^"#,
+                                                                      ^"#,
     );
 }
 
