@@ -31,8 +31,7 @@ use crate::math::{Aabb, Motion, Rgb, Vec2, Vec3};
 use crate::texture::{At, Texture};
 use choice::Choice;
 use far::Far;
-use local::Part;
-use moving::Moved;
+use local::{Part, Towards};
 
 /// What shines.
 #[derive(Clone, Debug)]
@@ -354,21 +353,19 @@ impl Lights {
         let item = self.items.get(index)?;
         let emitter = EmitterId(item.emitter);
         let prob = prob * share;
-        // A surface that moves is seen from its own coordinates.
-        let moved = self.moved(&item.what, from);
-        let eye = moved.as_ref().map_or(from.p, |m| m.into(from.p));
+        if let Some(moved) = self.moved(&item.what, from) {
+            return self.sample_moved(geoms, item, &moved, from.p, u, prob);
+        }
         let (towards, le) = match item.what {
             What::Part { part, radiance } => {
                 let g = geoms.get(part.shape().0 as usize)?;
-                (part.sample(g, eye, u)?, radiance)
+                (part.sample(g, from.p, u)?, radiance)
             }
             What::Textured { part, table } => {
                 let g = geoms.get(part.shape().0 as usize)?;
-                let (towards, at) = textured::sample(&part, g, self.table(table), eye, u)?;
+                let (towards, at) = textured::sample(&part, g, self.table(table), from.p, u)?;
                 (towards, self.textured(item.emitter, &at))
             }
-            // Beams do not move.
-            What::Beam { .. } if moved.is_some() => return None,
             What::Beam { part } => {
                 let g = geoms.get(part.shape().0 as usize)?;
                 let foot = beam::foot(&part, g, from)?;
@@ -377,33 +374,7 @@ impl Lights {
             }
             What::Point => return self.sample_point(item.emitter, from, prob),
         };
-        let towards = match &moved {
-            Some(moved) => moved.out(&towards, from.p)?,
-            None => towards,
-        };
-        let pdf = towards.pdf * prob;
-        (pdf > 0.0).then_some(EmitterSample {
-            wi: towards.wi,
-            dist: towards.dist,
-            end: Some(towards.end),
-            le,
-            density: Density::PerSr(pdf),
-            emitter,
-        })
-    }
-
-    /// How the surface of an item stands at the time of `from`, if it moves.
-    #[inline]
-    fn moved(&self, what: &What, from: &Hit) -> Option<Moved> {
-        if self.motions.is_empty() {
-            return None;
-        }
-        match what {
-            What::Part { part, .. } | What::Textured { part, .. } | What::Beam { part } => {
-                Some(Moved::new(self.motion(part.shape())?, from.time))
-            }
-            What::Point => None,
-        }
+        connection(towards, le, prob, emitter)
     }
 
     fn table(&self, index: Option<u32>) -> Option<&Tabulated2> {
@@ -461,25 +432,22 @@ impl Lights {
             return 0.0;
         };
         let what = &self.items[index as usize].what;
-        let moved = self.moved(what, from);
-        let (eye, p, ng) = match &moved {
-            Some(m) => (m.into(from.p), m.into(met.p), m.normal_into(met.ng)),
-            None => (from.p, met.p, met.ng),
-        };
-        let pdf = match *what {
-            What::Part { part, .. } => part.pdf(g, eye, p, ng),
-            What::Textured { part, table } => {
-                let at = place_of(met);
-                textured::pdf(&part, g, self.table(table), eye, (p, ng, &at))
-            }
-            What::Beam { .. } | What::Point => return 0.0,
-        };
-        let pdf = match &moved {
-            Some(moved) => moved.pdf_out(pdf, p - eye),
-            None => pdf,
+        let pdf = match self.moved(what, from) {
+            Some(moved) => self.pdf_moved(g, what, &moved, from.p, met),
+            None => self.pdf_of(g, what, from.p, (met.p, met.ng, &place_of(met))),
         };
         let prob = self.choice.prob(from, index as usize);
         prob * self.far.near_share() * pdf
+    }
+
+    /// Density per steradian at `eye` of the point `met` of an item: where it is, its normal and place.
+    #[inline]
+    fn pdf_of(&self, g: &Geometry, what: &What, eye: Vec3, met: (Vec3, Vec3, &At)) -> f32 {
+        match *what {
+            What::Part { part, .. } => part.pdf(g, eye, met.0, met.1),
+            What::Textured { part, table } => textured::pdf(&part, g, self.table(table), eye, met),
+            What::Beam { .. } | What::Point => 0.0,
+        }
     }
 
     /// Density per steradian at `from` with which [`Lights::sample`] returns the direction `d` to
@@ -493,6 +461,20 @@ impl Lights {
         })
         .sum()
     }
+}
+
+/// A connection to a point of a surface, chosen with probability `prob`.
+#[inline]
+fn connection(towards: Towards, le: Rgb, prob: f32, emitter: EmitterId) -> Option<EmitterSample> {
+    let pdf = towards.pdf * prob;
+    (pdf > 0.0).then_some(EmitterSample {
+        wi: towards.wi,
+        dist: towards.dist,
+        end: Some(towards.end),
+        le,
+        density: Density::PerSr(pdf),
+        emitter,
+    })
 }
 
 /// A connection that only its own direction can make; `le` is irradiance over its probability.
