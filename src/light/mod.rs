@@ -5,8 +5,8 @@
 //! not know what blocks the way.
 
 mod beam;
+mod build;
 mod choice;
-mod collect;
 pub mod env;
 mod far;
 mod local;
@@ -25,9 +25,9 @@ pub use spot::{Spot, SpotSpec};
 pub(crate) use beam::has_feet;
 
 use crate::bsdf::Density;
-use crate::geom::{Endpoint, Geometry, Hit, Ray, ShapeId, World};
+use crate::geom::{Endpoint, Geometry, Hit, Ray, ShapeId};
 use crate::math::warp::{self, Tabulated2};
-use crate::math::{Aabb, Motion, Rgb, Vec2, Vec3};
+use crate::math::{Motion, Rgb, Vec2, Vec3};
 use crate::texture::{At, Texture};
 use choice::Choice;
 use far::Far;
@@ -174,59 +174,6 @@ enum Radiance {
 const NO_ITEM: u32 = u32::MAX;
 
 impl Lights {
-    /// Emitters that are black or name a shape that is not there are left out.
-    pub fn new(emitters: Vec<Emitter>, geoms: &[Geometry]) -> Lights {
-        Lights::with_strategy(emitters, geoms, Strategy::Auto)
-    }
-
-    pub fn with_strategy(emitters: Vec<Emitter>, geoms: &[Geometry], strategy: Strategy) -> Lights {
-        Lights::build(emitters, geoms, Vec::new(), strategy)
-    }
-
-    /// The same for the shapes of `world`, where an emitter may be in a group that one placement moves.
-    /// What changes its form shines, but no connection is made to it.
-    pub fn in_world(emitters: Vec<Emitter>, world: &World, strategy: Strategy) -> Lights {
-        let shapes = (0..world.geometries().len() as u32).map(ShapeId);
-        let motions = match world.places() {
-            [] => Vec::new(),
-            _ => shapes
-                .map(|shape| world.placement_of(shape).map(|p| p.motion.clone()))
-                .collect(),
-        };
-        Lights::build(emitters, world.geometries(), motions, strategy)
-    }
-
-    fn build(
-        emitters: Vec<Emitter>,
-        geoms: &[Geometry],
-        motions: Vec<Option<Motion>>,
-        strategy: Strategy,
-    ) -> Lights {
-        let mut lights = Lights {
-            emitters: Vec::new(),
-            items: Vec::new(),
-            tables: Vec::new(),
-            choice: Choice::One,
-            far: Far::default(),
-            surfaces: vec![None; geoms.len()],
-            item_of: Vec::new(),
-            motions,
-        };
-        let mut bounds = Vec::new();
-        let mut far = Vec::new();
-        for (id, emitter) in emitters.iter().enumerate() {
-            lights.add(id as u32, emitter, geoms, &mut bounds, &mut far);
-        }
-        if !far.is_empty() {
-            let near = bounds.iter().map(|b| f64::from(b.power)).sum();
-            let near = (!bounds.is_empty()).then_some(near);
-            lights.far = Far::new(&emitters, far, near, radius(geoms));
-        }
-        lights.emitters = emitters;
-        lights.choice = Choice::new(strategy, &bounds);
-        lights
-    }
-
     pub fn emitters(&self) -> &[Emitter] {
         &self.emitters
     }
@@ -494,14 +441,5 @@ fn place_of(hit: &Hit) -> At {
         uv: hit.uv,
         prim: hit.prim,
         bary: hit.bary,
-    }
-}
-
-/// Of a sphere around all shapes.
-fn radius(geoms: &[Geometry]) -> f64 {
-    let all = geoms.iter().fold(Aabb::EMPTY, |b, g| b.union(g.bounds()));
-    match all.is_empty() {
-        true => 0.0,
-        false => 0.5 * all.diagonal().as_dvec3().length(),
     }
 }
