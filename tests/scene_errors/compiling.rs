@@ -114,11 +114,11 @@ a.xml:3:22: a part of the shape lies more than 1e15 from the origin, too far to 
     );
     says(
         building(
-            "<sensor type='perspective'/>\n<shape type='cylinder'><transform name='to_world'><scale x='2'/></transform></shape>",
+            "<sensor type='perspective'/>\n<shape type='cylinder'><transform name='to_world'><scale x='2'/></transform><emitter type='area'/></shape>",
         ),
         r#"
-a.xml:3:24: the transform makes the cylinder elliptic or oblique, which is not supported
-  <shape type='cylinder'><transform name='to_world'><scale x='2'/></transform></shape>
+a.xml:3:24: the transform makes the cylinder elliptic or oblique, which is not supported of an emitter
+  <shape type='cylinder'><transform name='to_world'><scale x='2'/></transform><emitter type='area'/></shape>
                          ^
   help: use a uniform scale, or a mesh of the shape"#,
     );
