@@ -117,14 +117,14 @@ impl Material {
                 side.shade_in(hit, facing(frame, hit.wo), u, dp_duv)
             }
             Material::Mask { opacity, inside } => {
-                let opacity = opacity.eval_scalar(&at(hit)).clamp(0.0, 1.0);
+                let opacity = opacity.eval_scalar(&At::of(hit)).clamp(0.0, 1.0);
                 match split(u, opacity) {
                     (true, u) => inside.shade_in(hit, frame, u, dp_duv),
                     (false, _) => Shading::new(hit, frame, PASS),
                 }
             }
             Material::Blend { weight, parts } => {
-                let weight = weight.eval_scalar(&at(hit)).clamp(0.0, 1.0);
+                let weight = weight.eval_scalar(&At::of(hit)).clamp(0.0, 1.0);
                 let (second, u) = split(u, weight);
                 parts[usize::from(second)].shade_in(hit, frame, u, dp_duv)
             }
@@ -136,7 +136,7 @@ impl Material {
                     dp_dv: hit.frame.to_local(dp_dv),
                     ng: hit.frame.to_local(hit.ng),
                 };
-                let bent = relief.bend(&frame, frame.to_local(hit.wo), &smooth, &at(hit));
+                let bent = relief.bend(&frame, frame.to_local(hit.wo), &smooth, &At::of(hit));
                 let shading = inside.shade_in(hit, bent.frame, u, dp_duv);
                 // What has two sides inside may have turned the bent frame around: the smooth one follows.
                 let turned = shading.normal().dot(bent.frame.n) < 0.0;
@@ -145,7 +145,7 @@ impl Material {
                     alpha2: bent.alpha2,
                 }))
             }
-            plain => Shading::new(hit, frame, plain.bsdf(&at(hit))),
+            plain => Shading::new(hit, frame, plain.bsdf(&At::of(hit))),
         }
     }
 
@@ -217,6 +217,20 @@ impl Material {
             Material::Mask { inside, .. } => inside.has_relief(),
             Material::Blend { parts, .. } => parts.iter().any(Material::has_relief),
             _ => false,
+        }
+    }
+
+    /// Whether a texture must be looked up at every hit.
+    pub fn is_textured(&self) -> bool {
+        let varies = |t: &Texture| t.as_constant().is_none();
+        match self {
+            Material::TwoSided { front, back } => front.is_textured() || back.is_textured(),
+            Material::Mask { opacity, inside } => varies(opacity) || inside.is_textured(),
+            Material::Blend { weight, parts } => {
+                varies(weight) || parts.iter().any(Material::is_textured)
+            }
+            Material::Relief { .. } => true,
+            plain => plain.textures().into_iter().any(varies),
         }
     }
 
@@ -301,9 +315,9 @@ impl Material {
                     },
                 }
             }
-            plain => match plain.textures().iter().all(|t| t.as_constant().is_some()) {
-                true => Material::Uniform(plain.bsdf(&At::default())),
-                false => plain,
+            plain => match plain.is_textured() {
+                true => plain,
+                false => Material::Uniform(plain.bsdf(&At::default())),
             },
         }
     }
@@ -334,15 +348,6 @@ impl Material {
             Material::Principled(p) => p.textures(),
             Material::PrincipledThin(p) => p.textures(),
         }
-    }
-}
-
-/// The place of a hit, as textures see it.
-pub fn at(hit: &Hit) -> At {
-    At {
-        uv: hit.uv,
-        prim: hit.prim,
-        bary: hit.bary,
     }
 }
 
