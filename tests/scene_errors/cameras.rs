@@ -337,7 +337,7 @@ a.xml:3:9: only an irradiance meter can stand inside a shape
 a.xml:2:9: sensor "batch" is not supported
   <sensor type='batch'/>
           ^
-  help: use one of the sensors "perspective", "thinlens" and "orthographic""#,
+  help: list its sensors in the scene; luxel renders the first"#,
     );
     says(
         inside("<sensor type='fluencemeter'/>"),
