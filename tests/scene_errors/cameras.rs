@@ -2,10 +2,6 @@
 
 use super::*;
 
-fn building(body: &str) -> String {
-    building_in(Path::new("nowhere"), body, &Overrides::default())
-}
-
 /// The error of building a sensor whose content begins on line 3.
 fn sensor(kind: &str, content: &str) -> String {
     building(&format!("<sensor type='{kind}'>\n{content}</sensor>"))
