@@ -5,7 +5,7 @@ use crate::common::direction;
 use crate::{sheet, solid};
 use luxel::bsdf::principled::Base;
 use luxel::bsdf::{Bsdf, Mode, Principled, PrincipledThin};
-use luxel::math::{Rgb, Vec3};
+use luxel::math::Rgb;
 
 /// base_color, roughness, anisotropic, metallic, spec_trans, eta, spec_tint, sheen, sheen_tint, flatness,
 /// clearcoat, clearcoat_gloss; polar angle and azimuth of wo and wi in degrees; f |cos wi|
