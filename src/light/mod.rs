@@ -215,7 +215,7 @@ impl Lights {
         match self.surfaces.get(hit.shape.0 as usize) {
             Some(Some(s)) if hit.wo.dot(hit.frame.n) > 0.0 => match s.radiance {
                 Radiance::Constant(radiance) => radiance,
-                Radiance::Textured(emitter) => self.textured(emitter, &At::of(hit)),
+                Radiance::Textured(emitter) => self.textured(emitter, &place_of(hit)),
             },
             _ => Rgb::BLACK,
         }
@@ -381,7 +381,7 @@ impl Lights {
         let what = &self.items[index as usize].what;
         let pdf = match self.moved(what, from) {
             Some(moved) => self.pdf_moved(g, what, &moved, from.p, met),
-            None => self.pdf_of(g, what, from.p, (met.p, met.ng, &At::of(met))),
+            None => self.pdf_of(g, what, from.p, (met.p, met.ng, &place_of(met))),
         };
         let prob = self.choice.prob(from, index as usize);
         prob * self.far.near_share() * pdf
@@ -434,4 +434,13 @@ fn delta(wi: Vec3, dist: f32, end: Endpoint, le: Rgb, emitter: EmitterId) -> Opt
         density: Density::Delta,
         emitter,
     })
+}
+
+/// The place of a hit, as textures see it.
+fn place_of(hit: &Hit) -> At {
+    At {
+        uv: hit.uv,
+        prim: hit.prim,
+        bary: hit.bary,
+    }
 }

@@ -2,11 +2,10 @@
 
 use super::local::Towards;
 use super::tree::LightBounds;
-use super::{EmitterId, EmitterSample, Item, Lights, What, connection, textured};
+use super::{EmitterId, EmitterSample, Item, Lights, What, connection, place_of, textured};
 use crate::geom::world::{normal, point};
 use crate::geom::{Endpoint, Geometry, Hit};
 use crate::math::{DVec3, Motion, Transform, Vec2, Vec3};
-use crate::texture::At;
 
 /// A surface at one time.
 pub(super) struct Moved {
@@ -127,7 +126,7 @@ impl Lights {
     ) -> f32 {
         let (eye, p) = (moved.into(eye), moved.into(met.p));
         let ng = moved.normal_into(met.ng);
-        moved.pdf_out(self.pdf_of(g, what, eye, (p, ng, &At::of(met))), p - eye)
+        moved.pdf_out(self.pdf_of(g, what, eye, (p, ng, &place_of(met))), p - eye)
     }
 }
 

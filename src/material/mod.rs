@@ -117,14 +117,14 @@ impl Material {
                 side.shade_in(hit, facing(frame, hit.wo), u, dp_duv)
             }
             Material::Mask { opacity, inside } => {
-                let opacity = opacity.eval_scalar(&At::of(hit)).clamp(0.0, 1.0);
+                let opacity = opacity.eval_scalar(&at(hit)).clamp(0.0, 1.0);
                 match split(u, opacity) {
                     (true, u) => inside.shade_in(hit, frame, u, dp_duv),
                     (false, _) => Shading::new(hit, frame, PASS),
                 }
             }
             Material::Blend { weight, parts } => {
-                let weight = weight.eval_scalar(&At::of(hit)).clamp(0.0, 1.0);
+                let weight = weight.eval_scalar(&at(hit)).clamp(0.0, 1.0);
                 let (second, u) = split(u, weight);
                 parts[usize::from(second)].shade_in(hit, frame, u, dp_duv)
             }
@@ -136,7 +136,7 @@ impl Material {
                     dp_dv: hit.frame.to_local(dp_dv),
                     ng: hit.frame.to_local(hit.ng),
                 };
-                let bent = relief.bend(&frame, frame.to_local(hit.wo), &smooth, &At::of(hit));
+                let bent = relief.bend(&frame, frame.to_local(hit.wo), &smooth, &at(hit));
                 let shading = inside.shade_in(hit, bent.frame, u, dp_duv);
                 // What has two sides inside may have turned the bent frame around: the smooth one follows.
                 let turned = shading.normal().dot(bent.frame.n) < 0.0;
@@ -145,7 +145,7 @@ impl Material {
                     alpha2: bent.alpha2,
                 }))
             }
-            plain => Shading::new(hit, frame, plain.bsdf(&At::of(hit))),
+            plain => Shading::new(hit, frame, plain.bsdf(&at(hit))),
         }
     }
 
@@ -348,6 +348,15 @@ impl Material {
             Material::Principled(p) => p.textures(),
             Material::PrincipledThin(p) => p.textures(),
         }
+    }
+}
+
+/// The place of a hit, as textures see it.
+pub fn at(hit: &Hit) -> At {
+    At {
+        uv: hit.uv,
+        prim: hit.prim,
+        bary: hit.bary,
     }
 }
 

@@ -8,9 +8,8 @@ pub use plan::{Plan, PlanEntry};
 
 use crate::geom::{Geometry, Hit, Ray, ShapeId, World};
 use crate::light::{Emitter, EmitterSample, Lights, Strategy};
-use crate::material::{Material, Shading};
+use crate::material::{self, Material, Shading};
 use crate::math::{DVec3, Rgb, Vec2, Vec3};
-use crate::texture::At;
 
 /// Index of a material of the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -150,7 +149,7 @@ impl Scene {
             let Some(hit) = self.intersect(&ray) else {
                 return through;
             };
-            through *= 1.0 - self.material(&hit).opacity(&At::of(&hit));
+            through *= 1.0 - self.material(&hit).opacity(&material::at(&hit));
             if through == 0.0 {
                 return 0.0;
             }

@@ -8,7 +8,6 @@ use std::sync::{Arc, LazyLock};
 
 use glam::Affine2;
 
-use crate::geom::Hit;
 use crate::image_io::color::srgb_to_linear;
 use crate::math::{Rgb, Vec2};
 
@@ -32,17 +31,6 @@ pub struct At {
     pub prim: u32,
     /// Barycentric weights of its second and third corner.
     pub bary: Vec2,
-}
-
-impl At {
-    /// The place of a hit.
-    pub fn of(hit: &Hit) -> At {
-        At {
-            uv: hit.uv,
-            prim: hit.prim,
-            bary: hit.bary,
-        }
-    }
 }
 
 impl Texture {
