@@ -199,6 +199,7 @@ impl Lights {
             ),
         };
         let count = match self.items.len() {
+            0 => "no light is at a finite distance".to_string(),
             1 => "there is 1 light at finite distance".to_string(),
             n => format!("there are {n} lights at finite distance"),
         };

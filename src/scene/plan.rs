@@ -105,7 +105,7 @@ pub fn of_world(plan: &mut Plan, world: &World) {
             plan.add("instances", "one tree", reason);
         }
         n => {
-            let reason = format!("groups stand in {n} places; a shape that moves is a group");
+            let reason = format!("places of groups: {n}; a shape that moves is a group");
             plan.add("instances", "a tree of its own for each group", reason);
         }
     }
@@ -113,7 +113,7 @@ pub fn of_world(plan: &mut Plan, world: &World) {
         (0, _) => {}
         (n, stretches) => {
             let decision = format!("{stretches} boxes, each for a stretch of time");
-            let reason = format!("of {n} shapes that move while the shutter is open");
+            let reason = format!("shapes and instances that change while the shutter is open: {n}");
             plan.add("moving shapes", decision, reason);
         }
     }
