@@ -1,16 +1,15 @@
 //! Figures measured with Mitsuba 3.9.1 (variant scalar_rgb), so that the same scene gives the same image.
 //! The directions are given by polar angle and azimuth in degrees.
 
+#[path = "common/local.rs"]
+mod local;
+
+use local::direction;
 use luxel::bsdf::{
     Bsdf, Conductor, Density, Dielectric, Microfacet, Mode, RoughConductor, Shape, ThinDielectric,
     metals,
 };
 use luxel::math::{DVec3, Rgb, Vec2, Vec3};
-
-fn direction(polar: f64, azimuth: f64) -> Vec3 {
-    let ((st, ct), (sp, cp)) = (polar.to_radians().sin_cos(), azimuth.to_radians().sin_cos());
-    DVec3::new(st * cp, st * sp, ct).as_vec3()
-}
 
 /// The numbers of a line that start at word `from`.
 fn numbers(line: &str, from: usize) -> Vec<f64> {

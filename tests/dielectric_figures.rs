@@ -1,16 +1,15 @@
 //! Figures of glass and plastic measured with Mitsuba 3.9.1 (variant scalar_rgb), so that the same scene
 //! gives the same image. Directions are given by polar angle and azimuth in degrees.
 
+#[path = "common/local.rs"]
+mod local;
+
+use local::direction;
 use luxel::bsdf::{
     Base, Bsdf, Coat, Density, Dielectric, Microfacet, Mode, Plastic, RoughDielectric,
     RoughPlastic, Shape,
 };
-use luxel::math::{DVec3, Rgb, Vec2, Vec3};
-
-fn direction(polar: f64, azimuth: f64) -> Vec3 {
-    let ((st, ct), (sp, cp)) = (polar.to_radians().sin_cos(), azimuth.to_radians().sin_cos());
-    DVec3::new(st * cp, st * sp, ct).as_vec3()
-}
+use luxel::math::{Rgb, Vec2, Vec3};
 
 /// The words of each line of a table, and the numbers among them.
 fn lines(table: &'static str) -> impl Iterator<Item = (&'static str, Vec<&'static str>, Vec<f64>)> {

@@ -132,7 +132,7 @@ fn intervals_hold_the_truth_in_95_percent_of_the_pixels() {
         ("box", boxed),
     ];
     for (name, xml) in scenes {
-        let share = coverage(&xml, 512, 32768);
+        let share = coverage(&xml, 256, 16384);
         println!("{name}: {:.2} %", 100.0 * share);
         // About 7,000 dependent intervals: a standard error of 0.4 %; an error estimate 10 % too small
         // would leave 92 %. Noise with long tails (caustics, glossy metal) needs more samples than these

@@ -5,8 +5,8 @@ mod common;
 mod directions;
 mod shapes;
 
-use common::{Rng, chi2_p_value, sidak};
-use directions::DirectionCheck;
+use common::{Rng, chi2_p_value, mean_and_error, sidak};
+use directions::{DirectionCheck, per_sr};
 use luxel::bsdf::Density;
 use luxel::geom::{Geometry, Hit, Mesh, Ray, ShapeId};
 use luxel::light::{Emitter, EmitterSample, Lights, Strategy};
@@ -31,13 +31,6 @@ fn rectangle(t: &Transform) -> Geometry {
 
 fn facing_down() -> Transform {
     Transform::rotate(DVec3::X, 180.0).unwrap()
-}
-
-fn pdf_of(s: &EmitterSample) -> f32 {
-    match s.density {
-        Density::PerSr(pdf) => pdf,
-        Density::Delta => panic!("a surface with a delta density"),
-    }
 }
 
 fn lit_shapes() -> Vec<(&'static str, Geometry)> {
@@ -84,7 +77,7 @@ fn connections_follow_their_density() {
         check.run(
             |rng| {
                 let s = lights.sample(&geoms, &from, rng.f32(), rng.vec2())?;
-                Some((s.wi, pdf_of(&s)))
+                Some((s.wi, per_sr(&s)))
             },
             |d| nearest(&geoms, &Ray::new(from.p, d)).is_some_and(|m| !lights.le(&m).is_black()),
         );
@@ -111,7 +104,7 @@ fn density_of_a_sample_is_the_density_of_its_direction() {
                     continue;
                 };
                 let pdf = lights.pdf(&geoms, &from, &met);
-                let ratio = pdf_of(&s) / pdf;
+                let ratio = per_sr(&s) / pdf;
                 // Where the surface is seen edge on the density changes fast with the direction.
                 let oblique = met.wo.dot(met.ng).abs() < 0.1;
                 if oblique || (met.p - s.end.unwrap().p).length() < 1e-4 * s.dist {
@@ -260,16 +253,11 @@ fn every_choice_gives_the_same_irradiance() {
         let lights = Lights::with_strategy(emitters.clone(), &geoms, strategy);
         // Independent samples, since the choice is not stratified.
         let mut rng = Rng::new(9);
-        let (mut sum, mut sum2, n) = (0f64, 0f64, 2_000_000);
-        for _ in 0..n {
-            if let Some(s) = lights.sample(&geoms, &from, rng.f32(), rng.vec2()) {
-                let w = (s.weight().g * s.wi.dot(from.frame.n).max(0.0)) as f64;
-                sum += w;
-                sum2 += w * w;
-            }
-        }
-        let mean = sum / n as f64;
-        let se = ((sum2 / n as f64 - mean * mean) / n as f64).sqrt();
+        let (mean, se) = mean_and_error(2_000_000, || {
+            let sample = lights.sample(&geoms, &from, rng.f32(), rng.vec2());
+            let towards = |s: EmitterSample| s.weight().g * s.wi.dot(from.frame.n).max(0.0);
+            f64::from(sample.map_or(0.0, towards))
+        });
         // A 1 % error would show: the standard error is well below a quarter of that.
         assert!(se < 0.0025 * mean, "{strategy:?}: {se} of {mean}");
         assert!(
@@ -296,7 +284,7 @@ fn environments_share_the_choice_with_other_lights() {
         let s = lights.sample(&geoms, &from, rng.f32(), rng.vec2());
         if let Some(s) = s.filter(|s| s.dist == f32::INFINITY) {
             // Both share the density of a direction.
-            assert!(pdf_of(&s) < lights.pdf_escaped(&from, s.wi));
+            assert!(per_sr(&s) < lights.pdf_escaped(&from, s.wi));
             sum += (s.weight().g * s.wi.z.max(0.0)) as f64;
         }
     }
@@ -379,7 +367,7 @@ fn extremes_give_ordinary_numbers() {
                         let Some(s) = lights.sample(&geoms, &from, rng.f32(), u) else {
                             continue;
                         };
-                        let pdf = pdf_of(&s);
+                        let pdf = per_sr(&s);
                         assert!(pdf > 0.0 && pdf.is_finite(), "{pdf}");
                         let w = s.weight().g;
                         assert!(w >= 0.0 && w.is_finite(), "{w}");

@@ -6,47 +6,17 @@ mod render;
 
 use std::sync::Arc;
 
-use common::Rng;
+use common::{Rng, Running, direction, seen_from};
 use glam::Affine2;
 use luxel::bsdf::{Bsdf, Diffuse, Microfacet, Mode, RoughConductor, Shape};
 use luxel::bsdf::{Conductor, Density};
-use luxel::geom::{Hit, PlaceId, ShapeId};
 use luxel::material::{Map, Material, Relief, Shading};
 use luxel::math::warp::uniform_sphere;
-use luxel::math::{Frame, Rgb, Vec2, Vec3};
+use luxel::math::{Rgb, Vec2, Vec3};
 use luxel::texture::{Bitmap, Interpolation, Picture, Texels, Texture, Wrap};
 use render::{assert_explained, camera, mean_and_error, picture, scene};
 
 const PI: f64 = std::f64::consts::PI;
-
-fn direction(theta_deg: f32, phi_deg: f32) -> Vec3 {
-    let ((sin, cos), (sin_phi, cos_phi)) = (
-        theta_deg.to_radians().sin_cos(),
-        phi_deg.to_radians().sin_cos(),
-    );
-    Vec3::new(sin * cos_phi, sin * sin_phi, cos)
-}
-
-/// A hit on the plane z = 0 with tangents x and y, seen from `wo`.
-fn hit(wo: Vec3, uv: Vec2) -> Hit {
-    Hit {
-        p: Vec3::ZERO,
-        p_err: Vec3::ZERO,
-        ng: Vec3::Z,
-        frame: Frame {
-            s: Vec3::X,
-            t: Vec3::Y,
-            n: Vec3::Z,
-        },
-        uv,
-        wo,
-        time: 0.0,
-        shape: ShapeId(0),
-        place: PlaceId::NONE,
-        prim: 0,
-        bary: Vec2::ZERO,
-    }
-}
 
 fn white() -> Material {
     Material::Uniform(Bsdf::Diffuse(Diffuse::new(Rgb::WHITE)))
@@ -64,7 +34,7 @@ fn normal_map(color: [f32; 3], shadowing: bool, inside: Material) -> Material {
 }
 
 fn shade(material: &Material, wo: Vec3) -> Shading {
-    material.shade(&hit(wo, Vec2::ZERO), 0.5, || (Vec3::X, Vec3::Y))
+    material.shade(&seen_from(wo, Vec2::ZERO), 0.5, || (Vec3::X, Vec3::Y))
 }
 
 /// f cos of a white diffuse surface, measured with Mitsuba 3.9.1.
@@ -167,7 +137,7 @@ fn bump_maps_match_measured_values() {
         let material = heights(scale);
         for ((wo, wi), expected) in directions.into_iter().zip(expected) {
             let tangents = || (Vec3::new(2.0, 0.5, 0.0), Vec3::new(0.0, 1.5, 0.0));
-            let shading = material.shade(&hit(wo, Vec2::from_array(uv)), 0.5, tangents);
+            let shading = material.shade(&seen_from(wo, Vec2::from_array(uv)), 0.5, tangents);
             let found = shading.eval_pdf(wi, Mode::Radiance).0.r;
             assert!(
                 (found - expected).abs() < 5e-6,
@@ -237,7 +207,7 @@ fn bent_materials_sample_what_they_say() {
             seed += 1;
             let mut rng = Rng::new(seed);
             // Pairs of sampled and integrated numbers: the share, and the weight with its moments.
-            let mut differences = [Stats::default(); 5];
+            let mut differences = [Running::default(); 5];
             for _ in 0..100_000 {
                 let sample = shading.sample(rng.f32(), rng.vec2(), Mode::Radiance);
                 let sampled = sample.map_or([0.0; 5], |s| {
@@ -276,34 +246,13 @@ fn bent_materials_sample_what_they_say() {
     }
 }
 
-/// Running mean and variance (Welford 1962).
-#[derive(Clone, Copy, Debug, Default)]
-struct Stats {
-    n: f64,
-    mean: f64,
-    m2: f64,
-}
-
-impl Stats {
-    fn add(&mut self, v: f64) {
-        self.n += 1.0;
-        let d = v - self.mean;
-        self.mean += d / self.n;
-        self.m2 += d * (v - self.mean);
-    }
-
-    fn stderr(&self) -> f64 {
-        (self.m2 / (self.n * (self.n - 1.0))).sqrt()
-    }
-}
-
 #[test]
 fn wild_reliefs_give_numbers() {
     let mut rng = Rng::new(5);
     let special = [0.0, -0.0, 0.5, 1.0, 1e-30, 1e30, -1e30];
     for _ in 0..20_000 {
-        let mut pick = |list: &[f32]| list[(rng.f32() * list.len() as f32) as usize];
-        let color = [pick(&special), pick(&special), pick(&special)];
+        let mut pick = |list: &[f64]| list[(rng.f32() * list.len() as f32) as usize];
+        let color = [(); 3].map(|()| pick(&special) as f32);
         let theta = pick(&[0.0, 30.0, 89.99999, 90.0, 90.00001, 150.0, 180.0]);
         let wo = direction(theta, pick(&[0.0, 45.0, 180.0]));
         let wi = direction(pick(&[0.0, 30.0, 89.99999, 90.0, 150.0]), 33.0);

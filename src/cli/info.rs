@@ -63,7 +63,7 @@ pub fn run(args: &InfoArgs) -> Result<Outcome, Failure> {
     println!("\nModelled");
     for e in plan {
         println!(
-            "  {:<12} {}\n               because {}",
+            "  {:<15} {}\n                  because {}",
             e.subject, e.decision, e.reason
         );
     }

@@ -96,7 +96,7 @@ pub fn children(
             };
             let what = format!(
                 "{plugin} takes at most {count}; the first is at {}",
-                short(&place(first))
+                place(first)
             );
             return Err(SceneError::new(place(child.at), what));
         }
@@ -300,7 +300,7 @@ fn excludes(plugin: &Plugin, a: &str, b: &str) -> bool {
 fn twice(name: &str, at: Span, first: Span, place: &dyn Fn(Span) -> Place) -> SceneError {
     let what = format!(
         "\"{name}\" is given twice; the first is at {}",
-        short(&place(first))
+        place(first)
     );
     SceneError::new(place(at), what)
 }
@@ -325,11 +325,6 @@ fn clash_text(
 ) -> String {
     format!(
         "{plugin} takes either \"{first}\" or \"{second}\", not both; \"{first}\" is at {}",
-        short(&place(first_at))
+        place(first_at)
     )
-}
-
-/// `file:line:column`
-pub fn short(place: &Place) -> String {
-    format!("{}:{}:{}", place.file.display(), place.line, place.column)
 }

@@ -49,17 +49,8 @@ impl SceneError {
 
 impl fmt::Display for SceneError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Place {
-            file,
-            line,
-            column,
-            text,
-        } = &self.at;
-        if *line == 0 {
-            write!(f, "{}: {}", file.display(), self.what)?;
-        } else {
-            write!(f, "{}:{line}:{column}: {}", file.display(), self.what)?;
-        }
+        write!(f, "{}: {}", self.at, self.what)?;
+        let Place { column, text, .. } = &self.at;
         if !text.is_empty() {
             let caret = format!("{:>1$}", '^', *column as usize);
             write!(f, "\n  {text}\n  {caret}")?;
@@ -71,6 +62,16 @@ impl fmt::Display for SceneError {
 }
 
 impl std::error::Error for SceneError {}
+
+/// `file:line:column`, or the file alone where it is meant as a whole.
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.line {
+            0 => write!(f, "{}", self.file.display()),
+            line => write!(f, "{}:{line}:{}", self.file.display(), self.column),
+        }
+    }
+}
 
 /// A place inside one of the sources of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -199,6 +199,7 @@ impl Lights {
             ),
         };
         let count = match self.items.len() {
+            0 => "no light is at a finite distance".to_string(),
             1 => "there is 1 light at finite distance".to_string(),
             n => format!("there are {n} lights at finite distance"),
         };
@@ -436,6 +437,7 @@ fn delta(wi: Vec3, dist: f32, end: Endpoint, le: Rgb, emitter: EmitterId) -> Opt
     })
 }
 
+/// The place of a hit, as textures see it.
 fn place_of(hit: &Hit) -> At {
     At {
         uv: hit.uv,

@@ -220,6 +220,20 @@ impl Material {
         }
     }
 
+    /// Whether a texture must be looked up at every hit.
+    pub fn is_textured(&self) -> bool {
+        let varies = |t: &Texture| t.as_constant().is_none();
+        match self {
+            Material::TwoSided { front, back } => front.is_textured() || back.is_textured(),
+            Material::Mask { opacity, inside } => varies(opacity) || inside.is_textured(),
+            Material::Blend { weight, parts } => {
+                varies(weight) || parts.iter().any(Material::is_textured)
+            }
+            Material::Relief { .. } => true,
+            plain => plain.textures().into_iter().any(varies),
+        }
+    }
+
     /// Whether chance decides what the material is at a hit.
     pub fn is_mixed(&self) -> bool {
         match self {
@@ -301,9 +315,9 @@ impl Material {
                     },
                 }
             }
-            plain => match plain.textures().iter().all(|t| t.as_constant().is_some()) {
-                true => Material::Uniform(plain.bsdf(&At::default())),
-                false => plain,
+            plain => match plain.is_textured() {
+                true => plain,
+                false => Material::Uniform(plain.bsdf(&At::default())),
             },
         }
     }

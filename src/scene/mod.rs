@@ -76,24 +76,12 @@ impl Scene {
     ) -> Scene {
         let emitters_can_be_met = emitters.iter().any(Emitter::can_be_met);
         let tangents = materials.iter().any(Material::follows_tangents);
-        match tangents {
-            true => plan.add(
-                "tangents",
-                "shading frames follow the texture coordinates",
-                "a material is anisotropic or has a relief",
-            ),
-            false => plan.add(
-                "tangents",
-                "none",
-                "no material is anisotropic or has a relief",
-            ),
-        }
         let mixed = materials.iter().any(Material::is_mixed);
         let masked = materials.iter().any(Material::lets_through);
-        plan_of_masks(&mut plan, masked);
         let lights = Lights::in_world(emitters, &world, Strategy::Auto);
-        plan_of_world(&mut plan, &world);
-        plan_of_lights(&mut plan, &lights, emitters_can_be_met);
+        plan::of_materials(&mut plan, &materials);
+        plan::of_world(&mut plan, &world);
+        plan::of_lights(&mut plan, &lights);
         Scene {
             world,
             surfaces,
@@ -271,55 +259,5 @@ impl Scene {
 impl std::fmt::Debug for Scene {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "Scene {:?}", self.counts())
-    }
-}
-
-fn plan_of_masks(plan: &mut Plan, masked: bool) {
-    match masked {
-        true => plan.add(
-            "masks",
-            "shadow rays look for the surfaces that let them through",
-            "a material is a mask or null",
-        ),
-        false => plan.add(
-            "masks",
-            "whatever a shadow ray meets blocks it",
-            "no material is a mask or null",
-        ),
-    }
-}
-
-fn plan_of_world(plan: &mut Plan, world: &World) {
-    match world.has_analytic() {
-        true => plan.add(
-            "shapes",
-            "triangles and exact shapes in one tree",
-            "there are spheres, disks, cylinders or grids of distances",
-        ),
-        false => plan.add("shapes", "triangles only", "no shape is anything else"),
-    }
-    match world.places().len() {
-        0 => plan.add("instances", "one tree", "no shape stands in several places"),
-        n => {
-            let reason = format!("groups of shapes stand in {n} places");
-            plan.add("instances", "a tree of its own for each group", reason);
-        }
-    }
-    match world.moving() {
-        (0, _) => {}
-        (n, stretches) => {
-            let decision = format!("{stretches} boxes, each for a stretch of time");
-            let reason = format!("of {n} shapes that move while the shutter is open");
-            plan.add("moving shapes", decision, reason);
-        }
-    }
-}
-
-fn plan_of_lights(plan: &mut Plan, lights: &Lights, emitters_can_be_met: bool) {
-    let (decision, reason) = lights.choice();
-    plan.add("light choice", decision, reason);
-    if !lights.is_empty() && !emitters_can_be_met {
-        let reason = "every light is a point or a beam, which no ray can meet";
-        plan.add("last bounce", "no ray to meet an emitter", reason);
     }
 }

@@ -1,21 +1,22 @@
 //! How much light comes back.
 
 use super::*;
+use common::Running;
 
 /// Means of the weights of what is reflected and of what passes, and their standard errors.
 fn furnace(bsdf: Bsdf, wo: Vec3, seed: u64, n: u32) -> [(f64, f64); 2] {
     let mut rng = Rng::new(seed);
-    let mut sums = [[0.0; 2]; 2];
+    let mut sides = [Running::default(); 2];
     for _ in 0..n {
+        let mut weights = [0.0; 2];
         if let Some(s) = bsdf.sample(wo, rng.f32(), rng.vec2(), P) {
-            let (side, w) = (usize::from(s.wi.z * wo.z < 0.0), f64::from(s.weight.g));
-            sums[side] = [sums[side][0] + w, sums[side][1] + w * w];
+            weights[usize::from(s.wi.z * wo.z < 0.0)] = f64::from(s.weight.g);
+        }
+        for (side, weight) in sides.iter_mut().zip(weights) {
+            side.add(weight);
         }
     }
-    sums.map(|[sum, sum2]| {
-        let (n, mean) = (f64::from(n), sum / f64::from(n));
-        (mean, ((sum2 / n - mean * mean).max(0.0) / n).sqrt())
-    })
+    sides.map(|side| (side.mean, side.stderr()))
 }
 
 /// No glass makes light, from either side; both ways to choose normals scatter the same share of it; and

@@ -1,10 +1,7 @@
 //! What rough glass and plastic become at the ends of their parameters.
 
 use super::*;
-
-fn mirror(wo: Vec3) -> Vec3 {
-    Vec3::new(-wo.x, -wo.y, wo.z)
-}
+use common::mirror;
 
 /// As roughness vanishes rough glass becomes glass: share and directions of both lobes.
 #[test]

@@ -6,19 +6,13 @@ mod energy;
 mod limits;
 mod samples;
 
-use common::Rng;
+use common::{Rng, direction};
 use luxel::bsdf::*;
-use luxel::math::{DVec3, Rgb, Vec2, Vec3};
+use luxel::math::{Rgb, Vec2, Vec3};
 
 const SHAPES: [Shape; 2] = [Shape::Ggx, Shape::Beckmann];
 const R: Mode = Mode::Radiance;
 const P: Mode = Mode::Importance;
-
-fn direction(polar_deg: f64, azimuth_deg: f64) -> Vec3 {
-    let (st, ct) = polar_deg.to_radians().sin_cos();
-    let (sp, cp) = azimuth_deg.to_radians().sin_cos();
-    DVec3::new(st * cp, st * sp, ct).as_vec3()
-}
 
 fn glass(shape: Shape, alpha: [f32; 2], eta: f32, visible: bool) -> Bsdf {
     let mut facets = Microfacet::new(shape, alpha[0], alpha[1]);

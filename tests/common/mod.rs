@@ -6,14 +6,17 @@
 //! of one per cent of shape or scale. Seeds are fixed and were not chosen.
 #![allow(dead_code, unused_imports)] // each test binary uses a part
 
+pub mod local;
 pub mod plan;
 pub mod quadrature;
 pub mod stats;
 
+pub use local::{direction, mirror, seen_from};
 pub use plan::{Chi2Plan, Domain};
-pub use stats::{chi2_p_value, sidak};
+pub use stats::{Running, chi2_p_value, mean_and_error, sidak};
 
-use luxel::math::Vec2;
+use luxel::bsdf::{Bsdf, Mode};
+use luxel::math::{Vec2, Vec3};
 use rand_pcg::Pcg32;
 use rand_pcg::rand_core::Rng as _;
 
@@ -34,4 +37,13 @@ impl Rng {
     pub fn vec2(&mut self) -> Vec2 {
         Vec2::new(self.f32(), self.f32())
     }
+}
+
+/// Mean weight of `n` samples and its standard error: the share of light from `wo` that is scattered on.
+pub fn furnace(bsdf: Bsdf, wo: Vec3, mode: Mode, seed: u64, n: u32) -> (f64, f64) {
+    let mut rng = Rng::new(seed);
+    mean_and_error(n, || {
+        let sample = bsdf.sample(wo, rng.f32(), rng.vec2(), mode);
+        f64::from(sample.map_or(0.0, |s| s.weight.g))
+    })
 }

@@ -1,4 +1,33 @@
-//! Tails of the distributions that the tests need.
+//! Means of samples, and tails of the distributions that the tests need.
+
+/// Running mean and variance (Welford 1962).
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Running {
+    n: f64,
+    pub mean: f64,
+    m2: f64,
+}
+
+impl Running {
+    pub fn add(&mut self, v: f64) {
+        self.n += 1.0;
+        let d = v - self.mean;
+        self.mean += d / self.n;
+        self.m2 += d * (v - self.mean);
+    }
+
+    /// Standard error of the mean.
+    pub fn stderr(&self) -> f64 {
+        (self.m2 / (self.n * (self.n - 1.0))).sqrt()
+    }
+}
+
+/// Mean of `n` samples and its standard error.
+pub fn mean_and_error(n: u32, mut sample: impl FnMut() -> f64) -> (f64, f64) {
+    let mut all = Running::default();
+    (0..n).for_each(|_| all.add(sample()));
+    (all.mean, all.stderr())
+}
 
 /// Level of each of `n` tests such that all of them together reject truth with probability `alpha`
 /// (Šidák 1967).

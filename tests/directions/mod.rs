@@ -1,8 +1,19 @@
 //! Sampled directions against their density where that has edges or poles, which rules out integrating it.
+#![allow(dead_code)] // each test binary uses a part
 
 use crate::common::{Rng, chi2_p_value};
+use luxel::bsdf::Density;
+use luxel::light::EmitterSample;
 use luxel::math::{DVec3, Frame, Vec3};
 use std::f64::consts::TAU;
+
+/// Density per steradian of a sample of a surface.
+pub fn per_sr(s: &EmitterSample) -> f32 {
+    match s.density {
+        Density::PerSr(pdf) => pdf,
+        Density::Delta => panic!("a surface with a delta density"),
+    }
+}
 
 /// Cells of equal solid angle around `axis`, out to an angle of squared sine `sin2` (1 or more: all).
 pub struct DirectionCheck<'a> {

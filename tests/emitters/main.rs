@@ -12,11 +12,13 @@ mod textured;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use common::Rng;
+use common::{Rng, mean_and_error};
 use glam::Affine2;
 use luxel::bsdf::Density;
 use luxel::geom::{Geometry, Mesh, Ray, ShapeId};
-use luxel::light::{Emitter, Lights, Projector, ProjectorSpec, Spot, SpotSpec, Strategy};
+use luxel::light::{
+    Emitter, EmitterSample, Lights, Projector, ProjectorSpec, Spot, SpotSpec, Strategy,
+};
 use luxel::math::{DVec3, Rgb, Transform, Vec2, Vec3, warp};
 use luxel::texture::{Bitmap, Interpolation, Picture, Texels, Texture, Wrap};
 use shapes::{cylinder, disk, nearest, receiver, scale, sphere};
@@ -347,20 +349,15 @@ fn mean(
     lights: &Lights,
     geoms: &[Geometry],
     from: &luxel::geom::Hit,
-    n: usize,
+    n: u32,
     seed: u64,
 ) -> (f64, f64) {
     let mut rng = Rng::new(seed);
-    let (mut sum, mut sum2) = (0f64, 0f64);
-    for _ in 0..n {
-        if let Some(s) = lights.sample(geoms, from, rng.f32(), rng.vec2()) {
-            let w = f64::from(s.weight().g * s.wi.dot(from.frame.n).max(0.0));
-            sum += w;
-            sum2 += w * w;
-        }
-    }
-    let mean = sum / n as f64;
-    (mean, ((sum2 / n as f64 - mean * mean) / n as f64).sqrt())
+    mean_and_error(n, || {
+        let sample = lights.sample(geoms, from, rng.f32(), rng.vec2());
+        let towards = |s: EmitterSample| s.weight().g * s.wi.dot(from.frame.n).max(0.0);
+        f64::from(sample.map_or(0.0, towards))
+    })
 }
 
 #[test]

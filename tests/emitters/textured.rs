@@ -2,22 +2,14 @@
 
 use std::f64::consts::PI;
 
-use super::common::{self, Rng};
-use super::directions::DirectionCheck;
+use super::common::{self, Rng, mean_and_error};
+use super::directions::{DirectionCheck, per_sr};
 use super::shapes::{cylinder, disk, nearest, receiver, scale, sphere, triangle};
 use super::{bitmap, spotted, turned_uv};
 use glam::Affine2;
-use luxel::bsdf::Density;
 use luxel::geom::{Geometry, Mesh, Ray, ShapeId};
-use luxel::light::{Emitter, EmitterSample, Lights};
+use luxel::light::{Emitter, Lights};
 use luxel::math::{DVec3, Transform, Vec2, Vec3, warp};
-
-fn pdf_of(s: &EmitterSample) -> f32 {
-    match s.density {
-        Density::PerSr(pdf) => pdf,
-        Density::Delta => panic!("a surface with a delta density"),
-    }
-}
 
 fn textured_shapes() -> Vec<(&'static str, Geometry)> {
     let tilt = Transform::rotate(DVec3::new(0.96, 0.0, 0.28), 140.0).unwrap();
@@ -74,7 +66,7 @@ fn textured_connections_follow_their_density() {
         check.run(
             |rng| {
                 let s = lights.sample(&geoms, &from, rng.f32(), rng.vec2())?;
-                Some((s.wi, pdf_of(&s)))
+                Some((s.wi, per_sr(&s)))
             },
             // Where it is black it is sampled all the same.
             |d| nearest(&geoms, &Ray::new(from.p, d)).is_some_and(|m| m.wo.dot(m.frame.n) > 0.0),
@@ -103,7 +95,7 @@ fn a_textured_sample_agrees_with_the_hit_in_its_direction() {
                 continue;
             }
             seen += 1;
-            let ratio = pdf_of(&s) / lights.pdf(&geoms, &from, &met);
+            let ratio = per_sr(&s) / lights.pdf(&geoms, &from, &met);
             let gap = (lights.le(&met).g - s.le.g).abs();
             // Next to the edge of a cell the hit may round into the neighbour.
             same += usize::from((ratio - 1.0).abs() < 1e-3 && gap < 1e-2 * (1.0 + s.le.g));
@@ -142,22 +134,17 @@ fn textured_surfaces_light_as_much_as_they_are_seen_to() {
         let from = receiver(Vec3::ZERO, Vec3::Z);
         let truth = irradiance_by_rays(&lights, &geoms, 500);
         let mut rng = Rng::new(6);
-        let (mut sum, mut sum2, n) = (0f64, 0f64, 500_000);
-        for _ in 0..n {
+        let (mean, se) = mean_and_error(500_000, || {
             let Some(s) = lights.sample(&geoms, &from, rng.f32(), rng.vec2()) else {
-                continue;
+                return 0.0;
             };
             // A cube and a sphere hide parts of themselves.
             let met = nearest(&geoms, &Ray::new(from.p, s.wi));
-            if met.is_some_and(|m| (m.p - from.p).length() < 0.999 * s.dist) {
-                continue;
+            match met.is_some_and(|m| (m.p - from.p).length() < 0.999 * s.dist) {
+                true => 0.0,
+                false => f64::from(s.weight().g * s.wi.z.max(0.0)),
             }
-            let w = f64::from(s.weight().g * s.wi.z.max(0.0));
-            sum += w;
-            sum2 += w * w;
-        }
-        let mean = sum / n as f64;
-        let se = ((sum2 / n as f64 - mean * mean) / n as f64).sqrt();
+        });
         assert!(se < 5e-3 * mean, "{name}: {se} of {mean}");
         assert!(
             (mean - truth).abs() < 4.0 * se + 2e-3 * truth,

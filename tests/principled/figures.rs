@@ -1,15 +1,11 @@
 //! Figures measured with Mitsuba 3.9.1 (variant scalar_rgb), so that the same scene gives the same image.
 //! Densities are not among them: the lobes are sampled in other shares.
 
+use crate::common::direction;
 use crate::{sheet, solid};
 use luxel::bsdf::principled::Base;
 use luxel::bsdf::{Bsdf, Mode, Principled, PrincipledThin};
-use luxel::math::{DVec3, Rgb, Vec3};
-
-fn direction(polar: f64, azimuth: f64) -> Vec3 {
-    let ((st, ct), (sp, cp)) = (polar.to_radians().sin_cos(), azimuth.to_radians().sin_cos());
-    DVec3::new(st * cp, st * sp, ct).as_vec3()
-}
+use luxel::math::Rgb;
 
 /// base_color, roughness, anisotropic, metallic, spec_trans, eta, spec_tint, sheen, sheen_tint, flatness,
 /// clearcoat, clearcoat_gloss; polar angle and azimuth of wo and wi in degrees; f |cos wi|

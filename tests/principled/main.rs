@@ -5,11 +5,11 @@ mod common;
 mod figures;
 mod sampling;
 
-use common::Rng;
+use common::{Rng, direction, furnace};
 use luxel::bsdf::principled::Base;
 use luxel::bsdf::*;
 use luxel::math::warp::uniform_sphere;
-use luxel::math::{DVec3, Rgb, Vec2, Vec3};
+use luxel::math::{Rgb, Vec2, Vec3};
 
 const R: Mode = Mode::Radiance;
 
@@ -19,12 +19,6 @@ pub fn solid(p: Principled) -> Bsdf {
 
 pub fn sheet(p: PrincipledThin) -> Bsdf {
     Bsdf::PrincipledThin(p)
-}
-
-pub fn direction(polar_deg: f64, azimuth_deg: f64) -> Vec3 {
-    let (st, ct) = polar_deg.to_radians().sin_cos();
-    let (sp, cp) = azimuth_deg.to_radians().sin_cos();
-    DVec3::new(st * cp, st * sp, ct).as_vec3()
 }
 
 fn grey(v: f32, roughness: f32) -> Base {
@@ -229,24 +223,6 @@ fn roughness_zero_is_smooth_glass() {
     }
 }
 
-/// Mean weight and its standard error: the share of light from `wo` that is scattered on.
-fn furnace(bsdf: Bsdf, wo: Vec3, mode: Mode) -> (f64, f64) {
-    let mut rng = Rng::new(7);
-    let (mut sum, mut sum2) = (0.0, 0.0);
-    let n = 40_000;
-    for _ in 0..n {
-        let sample = bsdf.sample(wo, rng.f32(), rng.vec2(), mode);
-        let w = f64::from(sample.map_or(0.0, |s| s.weight.g));
-        sum += w;
-        sum2 += w * w;
-    }
-    let n = f64::from(n);
-    (
-        sum / n,
-        ((sum2 / n - (sum / n) * (sum / n)).max(0.0) / n).sqrt(),
-    )
-}
-
 /// Metal, clear matter and sheets make no light. The model adds its reflection to a diffuse base that does
 /// not lose it, and on rough surfaces light that comes back: that stays below the bounds given here.
 #[test]
@@ -276,7 +252,7 @@ fn energy_is_bounded() {
                 ("paper", thin(0.0, 1.0, roughness), 1.5),
             ];
             for (name, bsdf, bound) in cases {
-                let (mean, error) = furnace(bsdf, wo, Mode::Importance);
+                let (mean, error) = furnace(bsdf, wo, Mode::Importance, 7, 40_000);
                 assert!(
                     mean <= bound + 1e-4 + 4.5 * error,
                     "{name} {roughness} {polar}: {mean} +- {error}"

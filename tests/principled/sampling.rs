@@ -1,7 +1,7 @@
 //! Samples of the principled materials against their densities and values.
 
-use crate::common::{Chi2Plan, Rng, chi2_p_value, sidak};
-use crate::{any, direction, sheet, solid};
+use crate::common::{Chi2Plan, Rng, chi2_p_value, direction, sidak};
+use crate::{any, sheet, solid};
 use luxel::bsdf::principled::Base;
 use luxel::bsdf::*;
 use luxel::math::warp::uniform_sphere;

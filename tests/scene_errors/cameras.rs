@@ -2,10 +2,6 @@
 
 use super::*;
 
-fn building(body: &str) -> String {
-    building_in(Path::new("nowhere"), body, &Overrides::default())
-}
-
 /// The error of building a sensor whose content begins on line 3.
 fn sensor(kind: &str, content: &str) -> String {
     building(&format!("<sensor type='{kind}'>\n{content}</sensor>"))
@@ -337,7 +333,7 @@ a.xml:3:9: only an irradiance meter can stand inside a shape
 a.xml:2:9: sensor "batch" is not supported
   <sensor type='batch'/>
           ^
-  help: use one of the sensors "perspective", "thinlens" and "orthographic""#,
+  help: list its sensors in the scene; luxel renders the first"#,
     );
     says(
         inside("<sensor type='fluencemeter'/>"),

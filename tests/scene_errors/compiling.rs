@@ -2,10 +2,6 @@
 
 use super::*;
 
-fn building(body: &str) -> String {
-    building_in(Path::new("nowhere"), body, &Overrides::default())
-}
-
 #[test]
 fn film_and_camera() {
     says(

@@ -1,10 +1,10 @@
 //! Emitters and spectra.
 
-use super::{Overrides, building_in, says};
+use super::says;
 
 fn building(body: &str) -> String {
     let body = format!("<sensor type='perspective'/>\n{body}");
-    building_in("nowhere".as_ref(), &body, &Overrides::default())
+    super::building(&body)
 }
 
 #[test]

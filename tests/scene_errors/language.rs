@@ -168,7 +168,7 @@ a.xml:2:9: medium "homogeneous" is not supported
 a.xml:2:8: shape "merge" is not supported
   <shape type='merge'/>
          ^
-  help: export the shape as a mesh in a PLY or OBJ file"#,
+  help: put the shapes that it merges directly into the scene"#,
     );
     says(
         inside("<bsdf type='diffuse'>\n\t<rgb name='refletance' value='0.5'/>\n</bsdf>"),

@@ -48,6 +48,11 @@ fn step(step: &str) -> String {
     ))
 }
 
+/// The error of building a scene that names no file.
+fn building(body: &str) -> String {
+    building_in(Path::new("nowhere"), body, &Overrides::default())
+}
+
 /// The error of building what stands inside a scene, which begins on line 2; files are looked for in `dir`.
 fn building_in(dir: &Path, body: &str, overrides: &Overrides) -> String {
     let xml = format!("<scene version='3.0.0'>\n{body}\n</scene>");

@@ -4,11 +4,7 @@ use super::*;
 
 fn building(body: &str) -> String {
     let sensor = "<sensor type='perspective'><float name='shutter_close' value='1'/></sensor>";
-    building_in(
-        "nowhere".as_ref(),
-        &format!("{body}\n{sensor}"),
-        &Overrides::default(),
-    )
+    super::building(&format!("{body}\n{sensor}"))
 }
 
 #[test]

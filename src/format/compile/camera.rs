@@ -74,8 +74,7 @@ pub fn shutter(sensor: &Props) -> Result<[f64; 2], SceneError> {
 }
 
 /// The camera of `sensor`, with the world as placed relative to `center` and the shape there that the sensor
-/// stands in. A meter turns the
-/// film's filter into a box, so that all its rays count the same.
+/// stands in. A meter turns the film's filter into a box, so that all its rays count the same.
 pub fn camera(
     sensor: &Sensor,
     shutter: [f64; 2],
@@ -145,11 +144,12 @@ pub fn plan(camera: &Camera, moves: bool, shutter: [f64; 2], plan: &mut Plan) {
             "nothing moves while the shutter is open",
         ),
     }
-    if let Some(lens) = camera.lens() {
-        match lens {
-            Lens::Pinhole => plan.add("lens", "pinhole", "there is no lens, or one of radius 0"),
-            Lens::Thin { .. } => plan.add("lens", "thin lens", "the lens has a radius"),
+    match camera.lens() {
+        Some(Lens::Pinhole) => {
+            plan.add("lens", "pinhole", "there is no lens, or one of radius 0");
         }
+        Some(Lens::Thin { .. }) => plan.add("lens", "thin lens", "the lens has a radius"),
+        None => plan.add("lens", "none", "the sensor is no perspective camera"),
     }
 }
 

@@ -38,12 +38,9 @@ pub fn lights<'a>(
         if is_surface(&emitter) {
             // At the top of the file it is a definition that shapes refer to.
             if !used.contains(&emitter.object_id()) {
-                let at = emitter.place();
                 warnings.push(format!(
-                    "{}:{}:{}: this {} emitter belongs to no shape and gives no light",
-                    at.file.display(),
-                    at.line,
-                    at.column,
+                    "{}: this {} emitter belongs to no shape and gives no light",
+                    emitter.place(),
                     emitter.plugin()
                 ));
             }
@@ -84,13 +81,7 @@ fn ignore_weight(emitter: &Props) {
 }
 
 fn second_environment(emitter: &Props, first: &Props) -> SceneError {
-    let at = first.place();
-    let what = format!(
-        "a second environment: the first is at {}:{}:{}",
-        at.file.display(),
-        at.line,
-        at.column
-    );
+    let what = format!("a second environment: the first is at {}", first.place());
     let error = emitter.error(what);
     error.with_help("a scene has one environment at most")
 }

@@ -248,9 +248,7 @@ impl<'a> Layout<'a> {
 
 /// A warning with its place.
 fn at(props: &Props, what: &str) -> String {
-    let at = props.place();
-    let (file, line, column) = (at.file.display(), at.line, at.column);
-    format!("{file}:{line}:{column}: {what}")
+    format!("{}: {what}", props.place())
 }
 
 fn check_reach(props: &Props, lo: DVec3, hi: DVec3) -> Result<(), SceneError> {

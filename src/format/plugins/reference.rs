@@ -37,6 +37,7 @@ fn write_plugin(text: &mut String, plugin: &Plugin) {
         let count = match (slot.min, slot.max) {
             (0, 1) => "at most one".into(),
             (0, usize::MAX) => "any number of".into(),
+            (min, max) if min == max => format!("exactly {min}"),
             (min, max) => format!("{min} to {max}"),
         };
         let _ = writeln!(text, "    holds {count} <{}>", slot.category);

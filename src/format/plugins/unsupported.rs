@@ -6,10 +6,8 @@ use Category::{Bsdf, Emitter, Film, Integrator, Sampler, Sensor, Shape, Texture}
 const SURFACES: &str = "luxel renders surfaces only; leave participating media out";
 const MESH: &str = "export the shape as a mesh in a PLY or OBJ file";
 const METHOD: &str = "use the integrator \"path\"";
-const DERIVATIVE: &str = "luxel computes no derivatives; use the integrator \"path\"";
-const RGB: &str = "luxel renders in RGB; write the colour with <rgb>";
 const BAKE: &str = "bake the texture into an image and use the texture \"bitmap\"";
-const NEAR_BSDF: &str = "use the nearest of diffuse, plastic, roughplastic, conductor, roughconductor, dielectric and roughdielectric";
+const CAMERAS: &str = "use one of the sensors \"perspective\", \"thinlens\" and \"orthographic\"";
 
 const TABLE: &[(Category, &[&str], &str)] = &[
     (
@@ -21,28 +19,50 @@ const TABLE: &[(Category, &[&str], &str)] = &[
             "ellipsoidsmesh",
             "heightfield",
             "hair",
-            "deformable",
             "blender",
-            "merge",
         ],
         MESH,
     ),
     (
+        Shape,
+        &["deformable"],
+        "use \"filename_end\" of the shapes \"obj\", \"ply\" and \"serialized\"",
+    ),
+    (
+        Shape,
+        &["merge"],
+        "put the shapes that it merges directly into the scene",
+    ),
+    (Bsdf, &["roughdiffuse"], "use \"diffuse\""),
+    (
         Bsdf,
-        &[
-            "pplastic",
-            "phong",
-            "ward",
-            "roughdiffuse",
-            "roughcoating",
-            "coating",
-            "hair",
-            "irawan",
-            "difftrans",
-            "hk",
-            "mixturebsdf",
-        ],
-        NEAR_BSDF,
+        &["phong", "ward", "irawan"],
+        "use \"principled\", \"roughplastic\" or \"roughconductor\"",
+    ),
+    (
+        Bsdf,
+        &["coating", "roughcoating"],
+        "use \"clearcoat\" of \"principled\"; over a diffuse base, \"plastic\" or \"roughplastic\"",
+    ),
+    (
+        Bsdf,
+        &["difftrans"],
+        "use \"diff_trans\" of \"principledthin\"",
+    ),
+    (
+        Bsdf,
+        &["hair"],
+        "luxel renders no fibres; use \"principled\" on a mesh",
+    ),
+    (
+        Bsdf,
+        &["hk"],
+        "luxel renders surfaces only; use \"principled\" or \"principledthin\"",
+    ),
+    (
+        Bsdf,
+        &["mixturebsdf"],
+        "use \"blendbsdf\", one within another for more than two materials",
     ),
     (
         Bsdf,
@@ -51,50 +71,69 @@ const TABLE: &[(Category, &[&str], &str)] = &[
     ),
     (
         Bsdf,
-        &[
-            "measured",
-            "measured_polarized",
-            "polarizer",
-            "retarder",
-            "circular",
-        ],
-        "luxel renders unpolarized RGB; use the nearest of diffuse, conductor, roughconductor and dielectric",
+        &["measured"],
+        "luxel renders no tables of measurements; use \"principled\" or \"roughconductor\"",
+    ),
+    (
+        Bsdf,
+        &["pplastic"],
+        "luxel renders unpolarized light; use \"roughplastic\"",
+    ),
+    (
+        Bsdf,
+        &["measured_polarized"],
+        "luxel renders unpolarized light; use \"principled\" or \"roughconductor\"",
+    ),
+    (
+        Bsdf,
+        &["polarizer", "retarder", "circular"],
+        "luxel renders unpolarized light; use \"mask\" or \"thindielectric\"",
     ),
     (
         Emitter,
-        &[
-            "collimated",
-            "sun",
-            "sky",
-            "sunsky",
-            "volumelight",
-            "timed_sunsky",
-        ],
-        "use a directional light, an area light or an environment map",
+        &["collimated"],
+        "use \"directionalarea\" in a small \"disk\"",
     ),
-    (Texture, &["rawconstant", "discrete"], RGB),
+    (Emitter, &["sun"], "use \"directional\""),
+    (
+        Emitter,
+        &["sky", "sunsky", "timed_sunsky"],
+        "bake the sky into an image and use \"envmap\"; for the sun, \"directional\"",
+    ),
+    (
+        Emitter,
+        &["volumelight"],
+        "luxel renders surfaces only; use \"area\" in a shape",
+    ),
     (
         Texture,
-        &[
-            "volume",
-            "vertexcolors",
-            "scale",
-            "gridtexture",
-            "wireframe",
-            "curvature",
-        ],
+        &["rawconstant"],
+        "write the number with <float>, or the colour with <rgb>",
+    ),
+    (
+        Texture,
+        &["discrete"],
+        "luxel renders in RGB; write the colour with <rgb>",
+    ),
+    (
+        Texture,
+        &["vertexcolors"],
+        "use \"mesh_attribute\" with the colours in a PLY file",
+    ),
+    (
+        Texture,
+        &["volume", "scale", "gridtexture", "wireframe", "curvature"],
         BAKE,
     ),
     (
         Sensor,
-        &[
-            "spherical",
-            "telecentric",
-            "perspective_rdist",
-            "batch",
-            "mpath",
-        ],
-        "use one of the sensors \"perspective\", \"thinlens\" and \"orthographic\"",
+        &["spherical", "telecentric", "perspective_rdist", "mpath"],
+        CAMERAS,
+    ),
+    (
+        Sensor,
+        &["batch"],
+        "list its sensors in the scene; luxel renders the first",
     ),
     (
         Sensor,
@@ -103,8 +142,13 @@ const TABLE: &[(Category, &[&str], &str)] = &[
     ),
     (
         Film,
-        &["ldrfilm", "mfilm", "specfilm", "tiledhdrfilm", "libfilm"],
+        &["ldrfilm", "mfilm", "tiledhdrfilm", "libfilm"],
         "use the film \"hdrfilm\"; -o with a name ending in .png writes an 8-bit image",
+    ),
+    (
+        Film,
+        &["specfilm"],
+        "luxel renders in RGB; use the film \"hdrfilm\"",
     ),
     (
         Integrator,
@@ -120,13 +164,28 @@ const TABLE: &[(Category, &[&str], &str)] = &[
             "vpl",
             "irrcache",
             "adaptive",
-            "depth",
-            "stokes",
+        ],
+        METHOD,
+    ),
+    (
+        Integrator,
+        &["depth"],
+        "use the integrator \"aov\" with the type \"depth\"",
+    ),
+    (
+        Integrator,
+        &["stokes"],
+        "luxel renders unpolarized light; use the integrator \"path\"",
+    ),
+    (
+        Integrator,
+        &[
             "volpath",
             "volpathmis",
             "volpath_simple",
+            "volprim_rf_basic",
         ],
-        METHOD,
+        "luxel renders surfaces only; use the integrator \"path\"",
     ),
     (
         Integrator,
@@ -134,11 +193,13 @@ const TABLE: &[(Category, &[&str], &str)] = &[
             "prb",
             "prb_basic",
             "prb_projective",
+            "prb_reparam",
             "prbvolpath",
             "direct_projective",
-            "volprim_rf_basic",
+            "direct_reparam",
+            "emission_reparam",
         ],
-        DERIVATIVE,
+        "luxel computes no derivatives; use the integrator \"path\"",
     ),
     (
         Sampler,

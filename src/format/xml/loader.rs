@@ -249,7 +249,7 @@ impl Loader {
             let what = format!(
                 "the id \"{}\" is taken; the first is at {}",
                 id.text,
-                check::short(&self.place(*first))
+                self.place(*first)
             );
             return Err(self.error(id.at, what));
         }

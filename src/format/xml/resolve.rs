@@ -1,6 +1,5 @@
 //! References become objects; cycles and chains too deep to follow are refused.
 
-use super::super::check::short;
 use super::super::desc::{Child, Mark, Object, ObjectId, place};
 use super::super::error::{SceneError, Source, Span, did_you_mean};
 use super::super::limits;
@@ -93,7 +92,7 @@ fn visit(
             let name = objects[k].id.as_deref().unwrap_or("");
             let what = format!(
                 "\"{name}\" contains itself; it is defined at {}",
-                short(&place(sources, objects[k].at))
+                place(sources, objects[k].at)
             );
             return Err(SceneError::new(at(), what));
         }

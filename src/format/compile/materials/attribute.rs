@@ -58,8 +58,7 @@ impl<'a> Materials<'a> {
         if a.values.max() * a.scale <= 1.0 {
             return a;
         }
-        let at = p.error_at(name, "").at;
-        let place = format!("{}:{}:{}", at.file.display(), at.line, at.column);
+        let place = p.error_at(name, "").at;
         let warning =
             format!("{place}: the mesh has values above 1, which as \"{name}\" are cut to 1");
         if !self.warnings.contains(&warning) {

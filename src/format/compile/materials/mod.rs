@@ -57,11 +57,7 @@ impl<'a> Materials<'a> {
     /// The materials by id; the plan says how many need a look-up.
     pub fn finish(self, plan: &mut Plan, warnings: &mut Vec<String>) -> Vec<Material> {
         warnings.extend(self.warnings);
-        let varying = self
-            .materials
-            .iter()
-            .filter(|m| !matches!(m, Material::Uniform(_) | Material::UniformBothSides(_)))
-            .count();
+        let varying = self.materials.iter().filter(|m| m.is_textured()).count();
         if varying == 0 {
             plan.add(
                 "textures",

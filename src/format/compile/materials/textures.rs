@@ -22,12 +22,9 @@ impl<'a> Materials<'a> {
                     && data.iter().flatten().any(|v| !(0.0..=1.0).contains(v))
                 {
                     if data.iter().flatten().any(|v| *v > 1.0) {
-                        let at = p.error_at(name, "values above 1 are cut to 1").at;
+                        let place = p.error_at(name, "").at;
                         self.warnings.push(format!(
-                            "{}:{}:{}: the picture has values above 1, which as \"{name}\" are cut to 1",
-                            at.file.display(),
-                            at.line,
-                            at.column
+                            "{place}: the picture has values above 1, which as \"{name}\" are cut to 1"
                         ));
                     }
                     let cut = data.iter().map(|t| t.map(|v| v.clamp(0.0, 1.0))).collect();
