@@ -14,6 +14,8 @@ use rand_pcg::rand_core::Rng;
 pub mod dim {
     /// Position within the pixel's reconstruction filter (2 numbers), lens position (2).
     pub const CAMERA: u32 = 0;
+    /// Time within the shutter (1 number), drawn only when something moves.
+    pub const TIME: u32 = 1;
     /// First block of the path's vertices; each owns [`PER_VERTEX`] blocks.
     pub const VERTEX: u32 = 8;
     pub const PER_VERTEX: u32 = 8;

@@ -4,7 +4,7 @@ mod common;
 
 use common::{Chi2Plan, Rng, sidak};
 use luxel::bsdf::*;
-use luxel::geom::{Hit, ShapeId};
+use luxel::geom::{Hit, PlaceId, ShapeId};
 use luxel::material::Material;
 use luxel::math::warp::uniform_hemisphere;
 use luxel::math::{DVec3, Frame, Rgb, Vec2, Vec3};
@@ -399,6 +399,7 @@ fn seen_along(wo: Vec3) -> Hit {
         shape: ShapeId(0),
         prim: 0,
         bary: Vec2::ZERO,
+        place: PlaceId::NONE,
     }
 }
 

@@ -18,7 +18,7 @@ const ROWS: [&[&str]; 9] = [
 
 /// Crates that only the named rooms may use. Threads (rayon) are for what loops over pixels, shapes or
 /// triangles, not for what happens at one hit.
-const CRATES: [(&str, &[&str]); 11] = [
+const CRATES: [(&str, &[&str]); 12] = [
     ("obvhs", &["geom"]),
     ("rayon", &["geom", "render", "study", "format", "cli"]),
     ("serde_json", &["render", "cli"]),
@@ -26,6 +26,7 @@ const CRATES: [(&str, &[&str]); 11] = [
     ("rand_pcg", &["sampler"]),
     ("exr", &["image_io"]),
     ("image", &["image_io"]),
+    ("flate2", &["format"]),
     ("roxmltree", &["format"]),
     ("clap", &["cli"]),
     ("indicatif", &["cli"]),

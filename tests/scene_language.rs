@@ -311,7 +311,7 @@ proptest! {
         let (ply_path, obj_path) = (dir.join("mutated.ply"), dir.join("mutated.obj"));
         fs::write(&ply_path, ply).unwrap();
         fs::write(&obj_path, obj).unwrap();
-        let read = [format::mesh_io::read_ply(&ply_path), format::mesh_io::read_obj(&obj_path)];
+        let read = [format::mesh_io::read_ply(&ply_path, &[]), format::mesh_io::read_obj(&obj_path)];
         for mesh in read.into_iter().flatten() {
             prop_assert!(mesh.positions.iter().all(|p| p.is_finite()));
             prop_assert!(mesh.normals.iter().flatten().all(|n| n.is_finite()));

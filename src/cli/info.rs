@@ -93,6 +93,7 @@ fn facts(job: &Job, spp: u64) -> Vec<(&'static str, String)> {
                 counts.shapes, counts.triangles, counts.analytic
             ),
         ),
+        ("instances", counts.instances.to_string()),
         ("materials", counts.materials.to_string()),
         ("emitters", counts.emitters.to_string()),
         (

@@ -186,7 +186,12 @@ fn value(plugin: &Plugin, param: &Param, value: &Value) -> Result<(), Wrong> {
         (Kind::Bool, Value::Bool(_))
         | (Kind::Text, Value::Text(_))
         | (Kind::Point | Kind::Vector, Value::Vector(_))
-        | (Kind::Transform, Value::Transform(_)) => Ok(()),
+        | (Kind::Transform | Kind::Motion, Value::Transform(_))
+        | (Kind::Motion, Value::Animation(_)) => Ok(()),
+        (Kind::Transform, Value::Animation(_)) => Err((
+            format!("\"{name}\" of {plugin} cannot move"),
+            Some(format!("write <transform name=\"{name}\">")),
+        )),
         (Kind::Choice(words), Value::Text(text)) => {
             if words.iter().any(|word| word.eq_ignore_ascii_case(text)) {
                 return Ok(());

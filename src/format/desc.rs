@@ -76,6 +76,8 @@ pub(super) enum Value {
     /// A point or a vector: Mitsuba takes either for the other.
     Vector(DVec3),
     Transform(Box<Transform>),
+    /// Keyframes at increasing times; at least one.
+    Animation(Vec<(f64, Transform)>),
 }
 
 impl Value {
@@ -90,6 +92,7 @@ impl Value {
             Value::Spectrum(_) => "a spectrum",
             Value::Vector(_) => "a point or vector",
             Value::Transform(_) => "a transform",
+            Value::Animation(_) => "an animation",
         }
     }
 }

@@ -13,6 +13,7 @@ pub mod mesh_io;
 pub mod plugins;
 mod props;
 pub mod spectrum;
+mod spectrum_plugins;
 mod xml;
 
 pub use compile::{Compiled, Overrides, compile};

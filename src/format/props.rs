@@ -4,8 +4,9 @@
 use super::desc::{Child, Given, Object, ObjectId, SceneDesc, Value};
 use super::error::{Place, SceneError};
 use super::plugins::{Category, Default, Kind, Param, Plugin, Role};
+use super::spectrum_plugins;
 use crate::bsdf::iors;
-use crate::math::{DVec3, Rgb, Transform};
+use crate::math::{DVec3, Motion, Rgb, Transform};
 use std::path::Path;
 
 /// A colour that is the same everywhere, or a texture.
@@ -219,6 +220,32 @@ impl<'a> Props<'a> {
         }
     }
 
+    /// All the transforms that a moving one goes through, or the one that does not move.
+    pub fn keyframes(&self, name: &str) -> Result<Vec<Transform>, SceneError> {
+        let (_, given) = self.lookup(name)?;
+        Ok(match given.map(|g| &g.value) {
+            Some(Value::Transform(t)) => vec![**t],
+            Some(Value::Animation(keys)) => keys.iter().map(|key| key.1).collect(),
+            _ => vec![Transform::IDENTITY],
+        })
+    }
+
+    /// A transform that may move while the shutter is open, from `shutter[0]` to `shutter[1]` of the
+    /// scene's time; the identity where the file gives none.
+    pub fn motion(&self, name: &str, shutter: [f64; 2]) -> Result<Motion, SceneError> {
+        let (param, given) = self.lookup(name)?;
+        match (given.map(|g| &g.value), param.default) {
+            (Some(Value::Transform(t)), _) => Ok(Motion::still(**t)),
+            (Some(Value::Animation(keys)), _) => Motion::new(keys, shutter).ok_or_else(|| {
+                let what = "the animation goes through a transform that is singular";
+                self.error_at(name, what)
+                    .with_help("mirror all of its transforms or none, and flatten none of them")
+            }),
+            (None, Default::Identity) => Ok(Motion::still(Transform::IDENTITY)),
+            _ => Err(self.mistyped(name, "a transform or an animation")),
+        }
+    }
+
     /// The index of refraction, also where the file names a medium.
     pub fn ior(&self, name: &str) -> Result<f64, SceneError> {
         let (param, given) = self.lookup(name)?;
@@ -244,7 +271,8 @@ impl<'a> Props<'a> {
         };
         if let Some(child) = self.named_child(name) {
             child.read.set();
-            return Ok(Some(RgbOrTexture::Texture(child.object)));
+            let value = Props::new(self.desc, child.object);
+            return spectrum_plugins::resolve(&value, role).map(Some);
         }
         let rgb = match (given.map(|g| &g.value), param.default) {
             (Some(value), _) => {
@@ -282,9 +310,16 @@ impl<'a> Props<'a> {
     /// `None` when neither file nor table gives a value.
     pub fn opt_float_or_texture(&self, name: &str) -> Result<Option<FloatOrTexture>, SceneError> {
         let (param, given) = self.lookup(name)?;
-        if let (Kind::FloatTexture(_), Some(child)) = (param.kind, self.named_child(name)) {
+        if let (Kind::FloatTexture(range), Some(child)) = (param.kind, self.named_child(name)) {
             child.read.set();
-            return Ok(Some(FloatOrTexture::Texture(child.object)));
+            let value = Props::new(self.desc, child.object);
+            return match spectrum_plugins::number(&value) {
+                None => Ok(Some(FloatOrTexture::Texture(child.object))),
+                Some(x) => match x? {
+                    x if range.contains(x) => Ok(Some(FloatOrTexture::Float(x))),
+                    _ => Err(self.mistyped(name, &range.to_string())),
+                },
+            };
         }
         match (given.map(|g| &g.value), param.default) {
             (Some(value), _) => float_of(value)
@@ -294,6 +329,12 @@ impl<'a> Props<'a> {
             (None, Default::Absent) => Ok(None),
             _ => Err(self.mistyped(name, "a number")),
         }
+    }
+
+    /// Every nested object, textures that are values of parameters too. Reads none of them.
+    pub(super) fn all_children(&self) -> impl Iterator<Item = Props<'a>> {
+        let (desc, object) = (self.desc, self.object());
+        object.children.iter().map(|c| Props { desc, id: c.object })
     }
 
     /// Nested objects and references of a category, in file order, with the names given to them.

@@ -23,7 +23,7 @@ pub struct MeshRef<'a> {
 
 /// What the acceleration structure must ask about shapes. Resolved at compile time: a scene of meshes
 /// without masks uses `()` and pays for nothing here.
-pub trait Hooks: Sync {
+pub trait Hooks {
     /// Whether there are shapes other than meshes; without, they are not hit.
     const SHAPES: bool;
     /// Whether some meeting may be refused.

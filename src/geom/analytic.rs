@@ -84,7 +84,7 @@ impl ObjectRay {
 }
 
 /// f64 distance as f32, if the ray reaches it: positive and not beyond `t_max` also after rounding.
-fn in_reach(t: f64, t_max: f32) -> Option<f32> {
+pub(super) fn in_reach(t: f64, t_max: f32) -> Option<f32> {
     let t32 = t as f32;
     (t > 0.0 && t <= t_max as f64).then(|| t32.clamp(f32::MIN_POSITIVE, t_max))
 }
@@ -335,6 +335,12 @@ impl Cylinder {
         self.flip_normals
     }
 
+    /// Centre of the end at v = 0, and from there to the other end.
+    pub fn axis(&self) -> (DVec3, DVec3) {
+        let m = self.to_world.matrix();
+        (m.translation, m.matrix3.z_axis)
+    }
+
     pub fn bounds(&self) -> Aabb {
         let m = self.to_world.matrix();
         let r = circle_extent(m.matrix3.x_axis, m.matrix3.y_axis);
@@ -426,7 +432,7 @@ fn circle_extent(x: DVec3, y: DVec3) -> DVec3 {
 }
 
 /// The smallest f32 box that holds the f64 box and the f32 roundings of its points.
-fn outward_box(min: DVec3, max: DVec3) -> Aabb {
+pub(super) fn outward_box(min: DVec3, max: DVec3) -> Aabb {
     Aabb {
         min: min.as_vec3().map(f32::next_down),
         max: max.as_vec3().map(f32::next_up),

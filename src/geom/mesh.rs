@@ -241,7 +241,7 @@ impl Mesh {
 
     /// Texture coordinates at weights `(b1, b2)`: interpolated, or the weights themselves without any.
     #[inline]
-    fn uv(&self, prim: u32, b: Vec2) -> Vec2 {
+    pub(super) fn uv(&self, prim: u32, b: Vec2) -> Vec2 {
         if self.uvs.is_empty() {
             b
         } else {
@@ -269,7 +269,12 @@ impl Mesh {
     #[inline]
     pub fn dp_duv(&self, prim: u32) -> (Vec3, Vec3) {
         let [p0, p1, p2] = self.triangle(prim);
-        let (e1, e2) = (p1 - p0, p2 - p0);
+        self.dp_duv_of(prim, p1 - p0, p2 - p0)
+    }
+
+    /// The same for a triangle whose edges from the first corner are `e1` and `e2`.
+    #[inline]
+    pub(super) fn dp_duv_of(&self, prim: u32, e1: Vec3, e2: Vec3) -> (Vec3, Vec3) {
         if self.uvs.is_empty() {
             return (e1, e2);
         }
@@ -310,6 +315,7 @@ impl Mesh {
             shape: raw.shape,
             prim: raw.prim,
             bary: raw.uv,
+            place: super::PlaceId::NONE,
         }
     }
 

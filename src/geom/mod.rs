@@ -6,15 +6,20 @@
 pub mod accel;
 pub mod analytic;
 pub mod mesh;
+pub mod sdf;
 pub mod wide;
+pub mod world;
 
 pub use accel::{Accel, Hooks, MeshRef};
 pub use analytic::{Cylinder, Disk, Sphere};
 pub use mesh::{Mesh, MeshError};
+pub use sdf::{Sdf, SdfGrid};
+pub use world::{Deforming, GroupId, PlaceId, Placement, World};
 
 use crate::math::{Aabb, Frame, Vec2, Vec3, fp, warp};
 
-/// A half-line or segment. `d` has unit length, so `t_max` is a distance.
+/// A half-line or segment. In the world `d` has unit length, so `t_max` is a distance; in the coordinates
+/// of a group of shapes it has any length, so that `t` remains that of the world.
 #[derive(Clone, Copy, Debug)]
 pub struct Ray {
     pub o: Vec3,
@@ -77,6 +82,8 @@ pub struct Hit {
     pub prim: u32,
     /// Barycentric weights of the second and third corner of a triangle.
     pub bary: Vec2,
+    /// The placement of the shape's group.
+    pub place: PlaceId,
 }
 
 impl Hit {
@@ -145,6 +152,10 @@ pub enum Geometry {
     Sphere(Sphere),
     Disk(Disk),
     Cylinder(Cylinder),
+    /// A mesh that changes its form over the shutter.
+    Deforming(Deforming),
+    /// Gives no light: it has no area to sample.
+    Sdf(Sdf),
 }
 
 impl Geometry {
@@ -154,22 +165,33 @@ impl Geometry {
             Geometry::Sphere(s) => s.bounds(),
             Geometry::Disk(s) => s.bounds(),
             Geometry::Cylinder(s) => s.bounds(),
+            Geometry::Deforming(s) => s.bounds(),
+            Geometry::Sdf(s) => s.bounds(),
         }
     }
 
+    /// Area, 0 for a grid of distances.
     pub fn area(&self) -> f64 {
         match self {
             Geometry::Mesh(s) => s.area(),
             Geometry::Sphere(s) => s.area(),
             Geometry::Disk(s) => s.area(),
             Geometry::Cylinder(s) => s.area(),
+            Geometry::Deforming(s) => s.area(),
+            Geometry::Sdf(_) => 0.0,
         }
+    }
+
+    /// Whether the shape is made of triangles.
+    pub fn is_mesh(&self) -> bool {
+        matches!(self, Geometry::Mesh(_) | Geometry::Deforming(_))
     }
 
     /// Triangles of a mesh; 1 for any other shape.
     pub fn prim_count(&self) -> u32 {
         match self {
             Geometry::Mesh(s) => s.indices().len() as u32,
+            Geometry::Deforming(s) => s.open().indices().len() as u32,
             _ => 1,
         }
     }
@@ -178,19 +200,22 @@ impl Geometry {
     pub fn prim_area(&self, prim: u32) -> f64 {
         match self {
             Geometry::Mesh(s) => s.triangle_area(prim),
+            Geometry::Deforming(s) => s.triangle_area(prim, 0.5),
             _ => self.area(),
         }
     }
 
     /// Distance of the first meeting in (0, t_max] and the surface parameters to keep for
     /// [`Geometry::hit`]. For meshes always `None`: their triangles belong to the acceleration structure.
+    /// The direction of `ray` may have any length.
     #[inline]
     pub fn intersect_analytic(&self, ray: &Ray, t_max: f32) -> Option<(f32, Vec2)> {
         match self {
-            Geometry::Mesh(_) => None,
+            Geometry::Mesh(_) | Geometry::Deforming(_) => None,
             Geometry::Sphere(s) => s.intersect(ray, t_max),
             Geometry::Disk(s) => s.intersect(ray, t_max),
             Geometry::Cylinder(s) => s.intersect(ray, t_max),
+            Geometry::Sdf(s) => s.intersect(ray, t_max),
         }
     }
 
@@ -203,6 +228,8 @@ impl Geometry {
             Geometry::Sphere(s) => s.at_hit(ray, raw.t),
             Geometry::Disk(s) => s.at_hit(ray),
             Geometry::Cylinder(s) => s.at_hit(ray, raw.t),
+            Geometry::Deforming(s) => return s.hit(ray, raw, tangents),
+            Geometry::Sdf(s) => return s.hit(ray, raw),
         };
         Hit {
             p: point.p.as_vec3(),
@@ -215,6 +242,7 @@ impl Geometry {
             shape: raw.shape,
             prim: raw.prim,
             bary: raw.uv,
+            place: PlaceId::NONE,
         }
     }
 
@@ -225,17 +253,32 @@ impl Geometry {
             Geometry::Sphere(s) => s.at_point(hit.p),
             Geometry::Disk(s) => s.at_point(hit.p),
             Geometry::Cylinder(s) => s.at_point(hit.p),
+            Geometry::Deforming(s) => return s.dp_duv(hit.prim, hit.time),
+            Geometry::Sdf(_) => return (Vec3::ZERO, Vec3::ZERO),
         };
         (point.dp_du.as_vec3(), point.dp_dv.as_vec3())
     }
 
+    /// Texture coordinates at the point `p` of a shape that is no mesh; zero for one.
+    pub fn uv_at(&self, p: Vec3) -> Vec2 {
+        match self {
+            Geometry::Mesh(_) | Geometry::Deforming(_) | Geometry::Sdf(_) => Vec2::ZERO,
+            Geometry::Sphere(s) => s.at_point(p).uv,
+            Geometry::Disk(s) => s.at_point(p).uv,
+            Geometry::Cylinder(s) => s.at_point(p).uv,
+        }
+    }
+
     /// A point of triangle `prim` (of the whole shape if it is no mesh), uniform over the area.
+    /// Of what deforms, in the middle of the shutter.
     pub fn sample_area(&self, prim: u32, u: Vec2) -> SurfaceSample {
         match self {
             Geometry::Mesh(m) => m.surface_sample(prim, warp::triangle(u)),
             Geometry::Sphere(s) => s.sample_area(u),
             Geometry::Disk(s) => s.sample_area(u),
             Geometry::Cylinder(s) => s.sample_area(u),
+            Geometry::Deforming(s) => s.surface_sample(prim, warp::triangle(u)),
+            Geometry::Sdf(s) => s.no_sample(),
         }
     }
 }

@@ -53,7 +53,7 @@ pub(crate) fn pdf_a_to_sr(pdf_a: f32, d: Vec3, ng: Vec3) -> f32 {
 }
 
 /// Kept within the positive f32 range. Zero distance gives zero, an edge-on view the largest number.
-fn bounded(pdf: f64) -> f32 {
+pub(super) fn bounded(pdf: f64) -> f32 {
     if pdf > 0.0 {
         pdf.clamp(f32::MIN_POSITIVE as f64, f32::MAX as f64) as f32
     } else {
@@ -63,8 +63,11 @@ fn bounded(pdf: f64) -> f32 {
 
 /// The parts of shape `shape`.
 pub(crate) fn parts_of(shape: ShapeId, geometry: &Geometry) -> Vec<Part> {
-    let Geometry::Mesh(mesh) = geometry else {
-        return vec![Part::Whole { shape }];
+    let mesh = match geometry {
+        Geometry::Mesh(mesh) => mesh,
+        // What changes its form is met, but not aimed at.
+        Geometry::Deforming(_) => return vec![],
+        _ => return vec![Part::Whole { shape }],
     };
     let count = mesh.indices().len() as u32;
     let mut parts = Vec::new();
@@ -169,6 +172,18 @@ impl Part {
         }
     }
 
+    /// Whether [`Part::sample`] is uniform over the area for a receiver at `eye`.
+    pub fn is_by_area(&self, g: &Geometry, eye: Vec3) -> bool {
+        match (*self, g) {
+            (Part::Triangle { prim, .. }, Geometry::Mesh(m)) => {
+                seen_triangle(m.triangle(prim), eye).is_none()
+            }
+            (Part::Rectangle { rectangle, .. }, _) => rectangle.is_by_area(eye),
+            (Part::Whole { .. }, Geometry::Sphere(_)) => false,
+            _ => true,
+        }
+    }
+
     /// Box, axis and cosine of the spread of the shading normals, for the light tree.
     pub fn bounds(&self, g: &Geometry) -> (Aabb, Vec3, f32) {
         match g {
@@ -195,11 +210,11 @@ impl Part {
     }
 }
 
-fn by_area(at: &SurfaceSample, d: Vec3) -> f32 {
+pub(super) fn by_area(at: &SurfaceSample, d: Vec3) -> f32 {
     pdf_a_to_sr(at.pdf_a, d, at.ng)
 }
 
-fn end_of(at: &SurfaceSample) -> Endpoint {
+pub(super) fn end_of(at: &SurfaceSample) -> Endpoint {
     Endpoint {
         p: at.p,
         p_err: at.p_err,
@@ -209,7 +224,7 @@ fn end_of(at: &SurfaceSample) -> Endpoint {
 
 /// The connection from `eye` to a sampled point. `None` where the density is not an ordinary number:
 /// seen edge on, where nothing is emitted, or at no distance.
-fn connect(
+pub(super) fn connect(
     at: SurfaceSample,
     eye: Vec3,
     pdf: impl Fn(&SurfaceSample, Vec3) -> f32,

@@ -118,16 +118,32 @@ impl Rectangle {
         ]
     }
 
-    /// Normal of the side that shines.
-    #[cfg(test)]
-    fn shining_normal(&self) -> Vec3 {
-        if self.front { self.ng } else { -self.ng }
-    }
-
     /// Whether a receiver at `eye` is on the side that shines.
     #[inline]
     fn shines_on(&self, eye: Vec3) -> bool {
         ((eye - self.corner).dot(self.ng) > 0.0) == self.front
+    }
+
+    /// Whether [`Rectangle::sample`] is uniform over the area for a receiver at `eye`.
+    pub fn is_by_area(&self, eye: Vec3) -> bool {
+        self.seen(eye).is_none()
+    }
+
+    /// The point at the parameters `st` in [0,1]².
+    pub fn at(&self, st: Vec2) -> Vec3 {
+        self.corner + self.x * (self.width * st.x) + self.y * (self.height * st.y)
+    }
+
+    /// The parameters of the point `p` of the rectangle.
+    pub fn locate(&self, p: Vec3) -> Vec2 {
+        let d = p - self.corner;
+        Vec2::new(d.dot(self.x) / self.width, d.dot(self.y) / self.height)
+    }
+
+    /// Normal of the side that shines.
+    #[cfg(test)]
+    fn shining_normal(&self) -> Vec3 {
+        if self.front { self.ng } else { -self.ng }
     }
 
     /// How it looks from `eye`, where that is worth sampling by solid angle.
@@ -197,7 +213,9 @@ impl Rectangle {
             Some(seen) => 1.0 / seen.solid_angle,
             None => self.pdf_by_area(d, dist),
         };
-        (pdf > 0.0 && pdf < f32::MAX).then_some(RectangleSample { p, wi, dist, pdf })
+        // A receiver within rounding of the plane may be given its own point.
+        let sound = dist > 0.0 && pdf > 0.0 && pdf < f32::MAX;
+        sound.then_some(RectangleSample { p, wi, dist, pdf })
     }
 
     /// Density per steradian at `eye` with which [`Rectangle::sample`] returns its point `p`.
@@ -339,6 +357,22 @@ mod tests {
                         s.pdf
                     );
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn receivers_on_the_rectangle_get_no_nan() {
+        let r = rectangle(2.4, 1.4);
+        for i in 0..64 {
+            let place = Vec2::new((i % 8) as f32 / 8.0 + 0.05, (i / 8) as f32 / 8.0 + 0.05);
+            let eye = r.at(place);
+            let samples = (0..64).filter_map(|k| {
+                let u = Vec2::new((k % 8) as f32 / 8.0 + 0.03, (k / 8) as f32 / 8.0 + 0.01);
+                r.sample(eye, u)
+            });
+            for s in samples {
+                assert!(s.wi.is_finite() && s.dist > 0.0 && s.pdf > 0.0, "{s:?}");
             }
         }
     }

@@ -9,14 +9,16 @@ use crate::math::fp::ONE_MINUS_EPSILON;
 use crate::math::{Aabb, Vec3, safe_sqrt};
 use std::f32::consts::{FRAC_PI_2, PI};
 
-/// What the tree knows of a light, or of all lights below a node. Emission is confined to within a right
-/// angle of one of the normals.
+/// What the tree knows of a light, or of all lights below a node. Emission is confined to within an angle,
+/// the reach, of one of the normals (or axes): a right angle for surfaces.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LightBounds {
     pub bounds: Aabb,
     /// Axis of the cone that holds all normals, and the cosine of its half-angle; -1 for all directions.
     pub axis: Vec3,
     pub cos_spread: f32,
+    /// Cosine of the reach.
+    pub cos_reach: f32,
     pub power: f32,
 }
 
@@ -27,6 +29,7 @@ struct Node {
     radius2: f32,
     axis: Vec3,
     cos_spread: f32,
+    cos_reach: f32,
     power: f32,
     /// Second child (the first one follows its parent), or the item of a leaf.
     link: Link,
@@ -186,6 +189,7 @@ impl Node {
             radius2: 0.25 * b.bounds.diagonal().length_squared(),
             axis: b.axis,
             cos_spread: b.cos_spread,
+            cos_reach: b.cos_reach,
             power: b.power,
             link,
         }
@@ -214,7 +218,7 @@ impl Node {
             );
             let (_, c) = subtract((s, c), (sin_u, cos_u));
             // Some room for the roundings on the way here: a light that can be seen is never lost.
-            if c < -1e-3 {
+            if c < self.cos_reach - 1e-3 {
                 return 0.0;
             }
             c.max(1e-3)
@@ -249,15 +253,16 @@ impl LightBounds {
             bounds: self.bounds.union(o.bounds),
             axis,
             cos_spread,
+            cos_reach: self.cos_reach.min(o.cos_reach),
             power: self.power + o.power,
         }
     }
 
     /// Measure of the directions that are lit, weighted by the cosine beyond the cone of normals (the
-    /// paper's M_Ω for an emission angle of π/2).
+    /// paper's M_Ω; its emission angle is the reach).
     fn orientation(&self) -> f32 {
         let o = self.cos_spread.clamp(-1.0, 1.0).acos();
-        let w = (o + FRAC_PI_2).min(PI);
+        let w = (o + self.cos_reach.clamp(-1.0, 1.0).acos()).min(PI);
         let (sin, cos) = o.sin_cos();
         2.0 * PI * (1.0 - cos)
             + FRAC_PI_2 * (2.0 * w * sin - (o - 2.0 * w).cos() - 2.0 * o * sin + cos)

@@ -4,11 +4,13 @@
 //! transforms and analytic intersections).
 
 pub mod fp;
+pub mod motion;
 pub mod special;
 pub mod transform;
 pub mod warp;
 
 pub use glam::{DVec2, DVec3, Vec2, Vec3, Vec3A, Vec4};
+pub use motion::Motion;
 pub use std::f32::consts::PI;
 pub use transform::Transform;
 

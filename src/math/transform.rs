@@ -37,6 +37,11 @@ impl Transform {
         (m.is_finite() && inv.is_finite() && condition < 1e15).then_some(Transform { m, inv })
     }
 
+    /// From a map and its inverse, which the caller knows.
+    pub(super) fn with_inverse(m: DAffine3, inv: DAffine3) -> Transform {
+        Transform { m, inv }
+    }
+
     /// From a row-major 4x4 matrix. `None` when it is not affine or not invertible.
     pub fn from_rows(rows: [[f64; 4]; 4]) -> Option<Transform> {
         let m = DMat4::from_cols_array_2d(&rows).transpose();

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use crate::film::{self, ErrorEstimate, Film, FilmSpec, FilterSampler, Tile};
 use crate::math::{Rgb, Vec2};
 use crate::sampler::{Sampler, SamplerKind, dim};
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, CameraSample, Scene};
 use crate::transport::aov::{self, Aov};
 use crate::transport::{IntegratorSpec, PathStats};
 
@@ -140,6 +140,7 @@ impl Job {
         let aovs: Vec<Aov> = self.aovs.iter().map(|l| l.aov).collect();
         let mut aov_values = Vec::new();
         let replicates = tile.replicates();
+        let moving = self.camera.moves() || self.scene.moves();
         for y in 0..tile.height {
             for x in 0..tile.width {
                 let (px, py) = (self.film.crop.x + tile.x + x, self.film.crop.y + tile.y + y);
@@ -147,13 +148,20 @@ impl Job {
                 let pixel = u64::from(py) * u64::from(self.film.width) + u64::from(px);
                 for s in first..first + n {
                     let sampler = Sampler::new(self.sampler, self.seed, pixel, s, replicates);
-                    let [u, v, ..] = sampler.get4(dim::CAMERA);
+                    let [u, v, lens_u, lens_v] = sampler.get4(dim::CAMERA);
                     let (offset, weight) = filter.sample(Vec2::new(u, v));
-                    let ray = self
-                        .camera
-                        .ray(Vec2::new(px as f32 + 0.5, py as f32 + 0.5) + offset);
+                    let time = match moving {
+                        true => sampler.get4(dim::TIME)[0],
+                        false => 0.0,
+                    };
+                    let seen = self.camera.ray(&CameraSample {
+                        film: Vec2::new(px as f32 + 0.5, py as f32 + 0.5) + offset,
+                        lens: Vec2::new(lens_u, lens_v),
+                        time,
+                    });
+                    let ray = seen.ray;
                     let li = self.integrator.li(&self.scene, ray, &sampler, &mut rays);
-                    let radiance = li.radiance;
+                    let radiance = li.radiance * seen.weight;
                     // A NaN fails the comparison too.
                     if radiance.is_finite() && radiance.min_component() >= 0.0 {
                         tile.add(x, y, s, radiance * weight);

@@ -1,13 +1,13 @@
 //! The scene as light transport sees it: flat, indexed by ids, immutable. It knows no files and no names.
 
-mod camera;
+pub mod camera;
 mod plan;
 
-pub use camera::{Camera, FovAxis, PerspectiveSpec};
+pub use camera::{Camera, CameraSample};
 pub use plan::{Plan, PlanEntry};
 
-use crate::geom::{Accel, Geometry, Hit, Hooks, MeshRef, Ray, ShapeId};
-use crate::light::{Emitter, EmitterSample, Lights};
+use crate::geom::{Geometry, Hit, Ray, ShapeId, World};
+use crate::light::{Emitter, EmitterSample, Lights, Strategy};
 use crate::material::{self, Material, Shading};
 use crate::math::{DVec3, Rgb, Vec2, Vec3};
 
@@ -19,9 +19,12 @@ pub struct MaterialId(pub u32);
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     pub shapes: usize,
+    /// Those of a group of shapes count once, however often it is placed.
     pub triangles: usize,
     /// Shapes that are intersected exactly, not as triangles.
     pub analytic: usize,
+    /// Places where groups of shapes stand.
+    pub instances: usize,
     pub materials: usize,
     pub emitters: usize,
     /// Memory of meshes and hierarchy.
@@ -30,16 +33,13 @@ pub struct Counts {
 
 /// Everything a ray can meet and every light.
 pub struct Scene {
-    geometries: Vec<Geometry>,
+    world: World,
     /// Material of each shape.
     surfaces: Vec<MaterialId>,
     materials: Vec<Material>,
     lights: Lights,
     /// Whether a ray can run into an emitter: false when all are points.
     emitters_can_be_met: bool,
-    accel: Accel,
-    /// Whether any shape is no mesh.
-    has_analytic: bool,
     /// Whether shading frames must follow dp/du.
     tangents: bool,
     /// Whether chance decides what some material is.
@@ -48,24 +48,6 @@ pub struct Scene {
     masked: bool,
     center: DVec3,
     plan: Plan,
-}
-
-/// Shapes that are no mesh, for the acceleration structure.
-struct Analytic<'a>(&'a [Geometry]);
-
-impl Hooks for Analytic<'_> {
-    const SHAPES: bool = true;
-    const FILTERS: bool = false;
-
-    #[inline]
-    fn intersect(&self, shape: ShapeId, ray: &Ray) -> Option<(f32, Vec2)> {
-        self.0[shape.0 as usize].intersect_analytic(ray, ray.t_max)
-    }
-
-    #[inline]
-    fn accept(&self, _: ShapeId, _: u32, _: Vec2) -> bool {
-        true
-    }
 }
 
 impl Scene {
@@ -77,31 +59,22 @@ impl Scene {
         materials: Vec<Material>,
         emitters: Vec<Emitter>,
         center: DVec3,
+        plan: Plan,
+    ) -> Scene {
+        let world = World::new(geometries);
+        Scene::with_world(world, surfaces, materials, emitters, center, plan)
+    }
+
+    /// The same for a world in which shapes stand in many places or move.
+    pub fn with_world(
+        world: World,
+        surfaces: Vec<MaterialId>,
+        materials: Vec<Material>,
+        emitters: Vec<Emitter>,
+        center: DVec3,
         mut plan: Plan,
     ) -> Scene {
-        let shapes = || {
-            geometries
-                .iter()
-                .enumerate()
-                .map(|(i, g)| (ShapeId(i as u32), g))
-        };
-        let meshes: Vec<MeshRef> = shapes()
-            .filter_map(|(shape, g)| match g {
-                Geometry::Mesh(m) => Some(MeshRef {
-                    shape,
-                    positions: m.positions(),
-                    indices: m.indices(),
-                }),
-                _ => None,
-            })
-            .collect();
-        let others: Vec<_> = shapes()
-            .filter(|(_, g)| !matches!(g, Geometry::Mesh(_)))
-            .map(|(id, g)| (id, g.bounds()))
-            .collect();
-        let accel = Accel::build(&meshes, &others);
-        let has_analytic = !others.is_empty();
-        let emitters_can_be_met = emitters.iter().any(|e| !matches!(e, Emitter::Point { .. }));
+        let emitters_can_be_met = emitters.iter().any(Emitter::can_be_met);
         let tangents = materials.iter().any(Material::follows_tangents);
         match tangents {
             true => plan.add(
@@ -118,16 +91,15 @@ impl Scene {
         let mixed = materials.iter().any(Material::is_mixed);
         let masked = materials.iter().any(Material::lets_through);
         plan_of_masks(&mut plan, masked);
-        let lights = Lights::new(emitters, &geometries);
-        plan_of_scene(&mut plan, &lights, has_analytic, emitters_can_be_met);
+        let lights = Lights::in_world(emitters, &world, Strategy::Auto);
+        plan_of_world(&mut plan, &world);
+        plan_of_lights(&mut plan, &lights, emitters_can_be_met);
         Scene {
-            geometries,
+            world,
             surfaces,
             materials,
             lights,
             emitters_can_be_met,
-            accel,
-            has_analytic,
             tangents,
             mixed,
             masked,
@@ -139,29 +111,29 @@ impl Scene {
     /// The nearest surface along `ray`.
     #[inline]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        let raw = if self.has_analytic {
-            self.accel.intersect_with(ray, &Analytic(&self.geometries))
-        } else {
-            self.accel.intersect(ray)
-        }?;
-        Some(self.geometries[raw.shape.0 as usize].hit(ray, &raw, self.tangents))
+        self.world.intersect(ray, self.tangents)
     }
 
     /// Whether anything stands in the way of `ray`.
     #[inline]
     pub fn occluded(&self, ray: &Ray) -> bool {
-        if self.has_analytic {
-            self.accel.occluded_with(ray, &Analytic(&self.geometries))
-        } else {
-            self.accel.occluded(ray)
-        }
+        self.world.occluded(ray)
+    }
+
+    /// dp/du and dp/dv at a hit, for bump maps; either is zero where it is undefined.
+    pub fn dp_duv(&self, hit: &Hit) -> (Vec3, Vec3) {
+        self.world.dp_duv(hit)
+    }
+
+    /// All that can be hit.
+    pub fn world(&self) -> &World {
+        &self.world
     }
 
     /// How the surface scatters at `hit`, seen from `hit.wo`; `u` in [0,1) decides where chance does.
     #[inline]
     pub fn shade(&self, hit: &Hit, u: f32) -> Shading {
-        let dp_duv = || self.geometries[hit.shape.0 as usize].dp_duv(hit);
-        self.material(hit).shade(hit, u, dp_duv)
+        self.material(hit).shade(hit, u, || self.world.dp_duv(hit))
     }
 
     /// Whether [`Scene::shade`] uses `u` for some material.
@@ -223,19 +195,26 @@ impl Scene {
     /// A connection from `from` to a light; `None` when the chosen one sends nothing there.
     #[inline]
     pub fn sample_light(&self, from: &Hit, u_pick: f32, u: Vec2) -> Option<EmitterSample> {
-        self.lights.sample(&self.geometries, from, u_pick, u)
+        self.lights.sample(self.world.geometries(), from, u_pick, u)
     }
 
     /// Density per steradian with which [`Scene::sample_light`] connects `from` to the emitter at `met`.
     #[inline]
     pub fn pdf_light(&self, from: &Hit, met: &Hit) -> f32 {
-        self.lights.pdf(&self.geometries, from, met)
+        self.lights.pdf(self.world.geometries(), from, met)
     }
 
     /// The same for light from infinity along `d`.
     #[inline]
     pub fn pdf_light_escaped(&self, from: &Hit, d: Vec3) -> f32 {
         self.lights.pdf_escaped(from, d)
+    }
+
+    /// Chooses among the lights by `strategy` from now on: for comparisons, since the one that is chosen by
+    /// itself is meant to be the best.
+    pub fn choose_lights_by(&mut self, strategy: Strategy) {
+        let emitters = self.lights.emitters().to_vec();
+        self.lights = Lights::in_world(emitters, &self.world, strategy);
     }
 
     pub fn is_emitter(&self, shape: ShapeId) -> bool {
@@ -256,6 +235,11 @@ impl Scene {
         self.emitters_can_be_met
     }
 
+    /// Whether anything in the scene moves while the shutter is open.
+    pub fn moves(&self) -> bool {
+        self.world.moves()
+    }
+
     /// The point of the world that all coordinates of the scene are relative to.
     pub fn center(&self) -> DVec3 {
         self.center
@@ -266,23 +250,20 @@ impl Scene {
     }
 
     pub fn counts(&self) -> Counts {
-        let meshes = self.geometries.iter().filter_map(|g| match g {
-            Geometry::Mesh(m) => Some(m),
-            _ => None,
-        });
-        let (mut triangles, mut count, mut bytes) = (0, 0, self.accel.bytes());
-        for m in meshes {
-            count += 1;
-            triangles += m.indices().len();
-            bytes += m.bytes();
+        let geometries = self.world.geometries();
+        let (mut triangles, mut meshes) = (0, 0);
+        for g in geometries.iter().filter(|g| g.is_mesh()) {
+            triangles += g.prim_count() as usize;
+            meshes += 1;
         }
         Counts {
-            shapes: self.geometries.len(),
+            shapes: geometries.len(),
             triangles,
-            analytic: self.geometries.len() - count,
+            analytic: geometries.len() - meshes,
+            instances: self.world.places().len(),
             materials: self.materials.len(),
             emitters: self.lights.emitters().len(),
-            geometry_bytes: bytes,
+            geometry_bytes: self.world.bytes(),
         }
     }
 }
@@ -308,19 +289,37 @@ fn plan_of_masks(plan: &mut Plan, masked: bool) {
     }
 }
 
-fn plan_of_scene(plan: &mut Plan, lights: &Lights, has_analytic: bool, emitters_can_be_met: bool) {
-    match has_analytic {
+fn plan_of_world(plan: &mut Plan, world: &World) {
+    match world.has_analytic() {
         true => plan.add(
             "shapes",
             "triangles and exact shapes in one tree",
-            "there are spheres, disks or cylinders",
+            "there are spheres, disks, cylinders or grids of distances",
         ),
         false => plan.add("shapes", "triangles only", "no shape is anything else"),
     }
+    match world.places().len() {
+        0 => plan.add("instances", "one tree", "no shape stands in several places"),
+        n => {
+            let reason = format!("groups of shapes stand in {n} places");
+            plan.add("instances", "a tree of its own for each group", reason);
+        }
+    }
+    match world.moving() {
+        (0, _) => {}
+        (n, stretches) => {
+            let decision = format!("{stretches} boxes, each for a stretch of time");
+            let reason = format!("of {n} shapes that move while the shutter is open");
+            plan.add("moving shapes", decision, reason);
+        }
+    }
+}
+
+fn plan_of_lights(plan: &mut Plan, lights: &Lights, emitters_can_be_met: bool) {
     let (decision, reason) = lights.choice();
     plan.add("light choice", decision, reason);
     if !lights.is_empty() && !emitters_can_be_met {
-        let reason = "every light is a point, which no ray can meet";
+        let reason = "every light is a point or a beam, which no ray can meet";
         plan.add("last bounce", "no ray to meet an emitter", reason);
     }
 }

@@ -1,10 +1,13 @@
 //! The full text of each error that a scene can cause.
 
+mod cameras;
 mod compiling;
+mod emitters;
 mod files;
 mod language;
 mod outside;
 mod values;
+mod world;
 
 use luxel::format::{self, Category, Overrides, SceneDesc, SceneError};
 use std::fs;

@@ -1,7 +1,7 @@
 //! Shapes for tests, and their intersection by brute force.
 #![allow(dead_code)] // each test binary uses a part
 
-use luxel::geom::{Cylinder, Disk, Geometry, Hit, Mesh, RawHit, Ray, ShapeId, Sphere};
+use luxel::geom::{Cylinder, Disk, Geometry, Hit, Mesh, PlaceId, RawHit, Ray, ShapeId, Sphere};
 use luxel::math::{DVec3, Frame, Transform, Vec2, Vec3};
 
 /// Nearest triangle by brute force in f64, or the analytic intersection.
@@ -87,5 +87,6 @@ pub fn receiver(p: Vec3, n: Vec3) -> Hit {
         shape: ShapeId(u32::MAX),
         prim: 0,
         bary: Vec2::ZERO,
+        place: PlaceId::NONE,
     }
 }

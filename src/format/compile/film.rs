@@ -1,14 +1,13 @@
-//! Film, sampler and camera.
+//! Film and sampler.
 
 use crate::film::{FilmSpec, Filter, Window};
 use crate::format::plugins::Category;
 use crate::format::{Overrides, Props, SceneError};
-use crate::math::DVec3;
 use crate::render::{ComponentFormat, PixelFormat};
 use crate::sampler::SamplerKind;
-use crate::scene::{Camera, FovAxis, PerspectiveSpec, Plan};
+use crate::scene::Plan;
 
-use super::{on_command_line, out_of_reach, suggest, within_reach};
+use super::{on_command_line, suggest};
 
 /// Most pixels of a picture: beyond, film and files would not fit into memory.
 const MAX_PIXELS: u64 = 1 << 28;
@@ -218,82 +217,4 @@ pub fn sampler(
     }
     plan.add("sampler", spec.kind.name(), reason);
     Ok(spec)
-}
-
-pub fn camera(sensor: &Props, film: &FilmSpec, center: DVec3) -> Result<Camera, SceneError> {
-    let to_world = sensor.transform("to_world")?;
-    for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
-        if (to_world.vector(axis).length_squared() - 1.0).abs() > 1e-3 {
-            let error = sensor.error_at("to_world", "the transform of a camera must not scale");
-            return Err(error.with_help("leave <scale> out: fov says how much the camera sees"));
-        }
-    }
-    if !within_reach(to_world.point(DVec3::ZERO)) {
-        return Err(sensor.error_at("to_world", out_of_reach("the camera")));
-    }
-    let (near, far) = (sensor.float("near_clip")?, sensor.float("far_clip")?);
-    if near >= far {
-        return Err(sensor.error_at(
-            "near_clip",
-            format!("near_clip {near} is not below far_clip {far}"),
-        ));
-    }
-    let open_close = [
-        sensor.float("shutter_open")?,
-        sensor.float("shutter_close")?,
-    ];
-    if open_close[0] > open_close[1] {
-        return Err(sensor.error_at("shutter_open", "the shutter closes before it opens"));
-    }
-    // A pinhole is sharp at every distance.
-    sensor.ignore(&["focus_distance"]);
-    let (fov_deg, fov_axis) = match sensor.opt_float("fov")? {
-        Some(fov) => {
-            let axis = match sensor.choice("fov_axis")? {
-                "y" => FovAxis::Y,
-                "diagonal" => FovAxis::Diagonal,
-                "smaller" => FovAxis::Smaller,
-                "larger" => FovAxis::Larger,
-                _ => FovAxis::X,
-            };
-            (fov, axis)
-        }
-        None => {
-            sensor.ignore(&["fov_axis"]);
-            (fov_of_focal_length(sensor)?, FovAxis::Diagonal)
-        }
-    };
-    let principal_point_offset = [
-        sensor.float("principal_point_offset_x")?,
-        sensor.float("principal_point_offset_y")?,
-    ];
-    let spec = PerspectiveSpec {
-        to_world,
-        fov_deg,
-        fov_axis,
-        principal_point_offset,
-        near_clip: near,
-        far_clip: far,
-    };
-    Ok(Camera::perspective(&spec, film, center))
-}
-
-/// Diagonal field of view, in degrees, of a lens on 35 mm film (36 x 24 mm).
-fn fov_of_focal_length(sensor: &Props) -> Result<f64, SceneError> {
-    let text = sensor.string("focal_length")?;
-    let number = text
-        .strip_suffix("mm")
-        .unwrap_or(text)
-        .trim()
-        .parse::<f64>()
-        .ok();
-    let length = number
-        .filter(|l| l.is_finite() && *l > 0.0)
-        .ok_or_else(|| {
-            let what = format!("\"{text}\" is no focal length");
-            sensor
-                .error_at("focal_length", what)
-                .with_help("write millimetres, such as 50mm")
-        })?;
-    Ok(2.0 * (0.5 * 36f64.hypot(24.0) / length).atan().to_degrees())
 }

@@ -1,23 +1,25 @@
 //! From the description of a scene to a job that can be rendered: every default settled, every name
 //! turned into an index, the plan made.
 
+mod attributes;
+mod camera;
 mod film;
 mod integrator;
 mod lights;
 mod materials;
 mod shapes;
-
-use rayon::prelude::*;
+mod world;
 
 use super::error::command_line;
 use super::plugins::Category;
-use super::{Props, SceneDesc, SceneError, did_you_mean, list};
+use super::{SceneDesc, SceneError, did_you_mean, list};
 use crate::film::Window;
 use crate::math::DVec3;
 use crate::render::{AovLayer, Job};
 use crate::scene::{Plan, Scene};
 use crate::transport::aov::Aov;
 use materials::Materials;
+use world::Layout;
 
 /// What the command line asks for in place of what the scene says.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -57,9 +59,10 @@ pub fn compile(desc: &SceneDesc, overrides: &Overrides) -> Result<Compiled, Scen
     let root = desc.scene();
     let mut plan = Plan::default();
     let mut warnings = Vec::new();
-    let sensor = the_sensor(&root, &mut warnings)?;
-    let film = film::film(&sensor, overrides)?;
-    let sampler = film::sampler(&sensor, overrides, &mut plan)?;
+    let sensor = camera::the_sensor(&root, &root.children(Category::Shape), &mut warnings)?;
+    let shutter = camera::shutter(&sensor.props)?;
+    let mut film = film::film(&sensor.props, overrides)?;
+    let sampler = film::sampler(&sensor.props, overrides, &mut plan)?;
     let (integrator, mut aovs) = integrator::integrator(&root, overrides)?;
     if film.pixel_format.has_alpha() {
         aovs.push(AovLayer {
@@ -68,24 +71,33 @@ pub fn compile(desc: &SceneDesc, overrides: &Overrides) -> Result<Compiled, Scen
         });
     }
 
-    let shape_props = root.children(Category::Shape);
-    let sources: Result<Vec<_>, SceneError> = shape_props.par_iter().map(shapes::read).collect();
-    let (shapes, center) = shapes::place(sources?, &mut plan)?;
-    let mut materials = Materials::new(desc);
+    let layout = Layout::new(&root, shutter, &mut warnings)?;
+    let (world, center, attributes) = layout.build(&mut plan)?;
+    let measured = layout.measured(&sensor)?;
+    let shape_props = layout.shapes;
+    let mut materials = Materials::new(desc, attributes);
     let mut surfaces = Vec::with_capacity(shape_props.len());
     for props in &shape_props {
         surfaces.push(materials.of_shape(props)?);
     }
-    let lights = lights::lights(&root, &shape_props, &mut materials, center, &mut warnings)?;
+    let lights = lights::lights(
+        &root,
+        &shape_props,
+        &world,
+        &mut materials,
+        center,
+        &mut warnings,
+    )?;
     if lights.is_empty() {
         warnings.push("the scene has no emitter, so the picture is black".to_string());
     }
-    let camera = film::camera(&sensor, &film.spec, center)?;
+    let camera = camera::camera(&sensor, shutter, &mut film.spec, (&world, measured), center)?;
+    camera::plan(&camera, camera.moves() || world.moves(), shutter, &mut plan);
     let materials = materials.finish(&mut plan, &mut warnings);
     desc.check_all_read()?;
     Ok(Compiled {
         job: Job {
-            scene: Scene::new(shapes, surfaces, materials, lights, center, plan),
+            scene: Scene::with_world(world, surfaces, materials, lights, center, plan),
             camera,
             film: film.spec,
             sampler: sampler.kind,
@@ -123,21 +135,4 @@ fn on_command_line(option: &str, value: &str, what: impl Into<String>) -> SceneE
 /// A help line for a name that is not among `names`: the nearest one, or all of them.
 fn suggest<'a>(found: &str, names: impl IntoIterator<Item = &'a str> + Clone) -> String {
     did_you_mean(found, names.clone()).unwrap_or_else(|| format!("there are {}", list(names)))
-}
-
-fn the_sensor<'a>(root: &Props<'a>, warnings: &mut Vec<String>) -> Result<Props<'a>, SceneError> {
-    let sensors = root.children(Category::Sensor);
-    if sensors.len() > 1 {
-        warnings.push(format!(
-            "the scene has {} sensors: the first one is rendered",
-            sensors.len()
-        ));
-    }
-    for unused in sensors.iter().skip(1) {
-        unused.ignore_all();
-    }
-    sensors.into_iter().next().ok_or_else(|| {
-        root.error("the scene has no sensor")
-            .with_help("add <sensor type=\"perspective\"> to say where to look from")
-    })
 }

@@ -1,12 +1,19 @@
-//! Readers of mesh files: Wavefront OBJ and PLY, into plain arrays.
+//! Readers of mesh files: Wavefront OBJ, PLY and Mitsuba's serialized meshes, into plain arrays;
+//! and of the grids that stand for a shape.
 //!
 //! Positions stay in f64, since the scene is moved to its centre only later. What is wrong with a
 //! file is told with its name and, for text, its line. Nothing is allocated on the word of a header
 //! alone: declared counts are held against the bytes that are there.
 
+mod attributes;
 mod obj;
 mod ply;
 mod ply_header;
+mod serialized;
+mod vol;
+
+pub use attributes::Attribute;
+pub use vol::GridData;
 
 use super::limits;
 use crate::math::{DVec3, Vec2, Vec3};
@@ -25,6 +32,10 @@ pub struct MeshData {
     /// Per vertex; (0, 0) for a vertex without, when others have one.
     pub uvs: Option<Vec<Vec2>>,
     pub indices: Vec<[u32; 3]>,
+    /// Those that were asked for: a value per vertex, or per triangle.
+    pub attributes: Vec<Attribute>,
+    /// The names of all that there are.
+    pub attribute_names: Vec<String>,
 }
 
 /// What is wrong with a mesh file.
@@ -56,24 +67,40 @@ pub fn read_obj(path: &Path) -> Result<MeshData, MeshError> {
     read_with(path, |bytes| obj::parse(&bytes))
 }
 
-/// Reads a PLY file, ASCII or binary of either byte order.
-pub fn read_ply(path: &Path) -> Result<MeshData, MeshError> {
-    read_with(path, |bytes| ply::parse(&bytes))
+/// Reads a PLY file, ASCII or binary of either byte order, with the attributes of the names `wanted`.
+pub fn read_ply(path: &Path, wanted: &[String]) -> Result<MeshData, MeshError> {
+    read_with(path, |bytes| ply::parse(&bytes, wanted))
+}
+
+/// Reads mesh `index`, from 0, of a file of Mitsuba's serialized meshes, version 3 or 4.
+pub fn read_serialized(path: &Path, index: usize) -> Result<MeshData, MeshError> {
+    read_with(path, |bytes| serialized::parse(&bytes, index))
+}
+
+/// Reads a grid of numbers from a volume file of Mitsuba (`.vol`): one channel of 32-bit floats.
+pub fn read_grid(path: &Path) -> Result<GridData, MeshError> {
+    let error = |(line, what)| MeshError {
+        file: path.to_path_buf(),
+        line,
+        what,
+    };
+    let bytes = read_bytes(path).map_err(|what| error((None, what)))?;
+    vol::parse(&bytes).map_err(error)
 }
 
 fn read_with(
     path: &Path,
     parse: impl FnOnce(Vec<u8>) -> Result<MeshData, Wrong>,
 ) -> Result<MeshData, MeshError> {
-    let error = |line, what| MeshError {
+    let error = |(line, what)| MeshError {
         file: path.to_path_buf(),
         line,
         what,
     };
-    let bytes = read_bytes(path).map_err(|what| error(None, what))?;
-    let mesh = parse(bytes).map_err(|(line, what)| error(line, what))?;
+    let bytes = read_bytes(path).map_err(|what| error((None, what)))?;
+    let mesh = parse(bytes).map_err(error)?;
     if mesh.indices.is_empty() {
-        return Err(error(None, "the mesh has no triangles".into()));
+        return Err(error((None, "the mesh has no triangles".into())));
     }
     Ok(mesh)
 }

@@ -166,6 +166,7 @@ impl Reader {
             normals: has_normals.then(|| vertices.iter().map(normal).collect()),
             uvs: has_uvs.then(|| vertices.iter().map(uv).collect()),
             indices: self.indices,
+            ..MeshData::default()
         }
     }
 }

@@ -1,11 +1,13 @@
 //! PLY (the Stanford polygon format 1.0): ASCII, and binary in either byte order, any scalar types.
 
 use super::super::limits::POLYGON_CORNERS;
+use super::attributes::Columns;
 use super::ply_header::{Element, Encoding, Header, Property, Scalar, header};
 use super::{MeshData, Wrong, number, push_fan, shown};
 use crate::math::{DVec3, Vec2, Vec3};
 
-pub fn parse(bytes: &[u8]) -> Result<MeshData, Wrong> {
+/// The mesh, with the attributes of the names `wanted`.
+pub fn parse(bytes: &[u8], wanted: &[String]) -> Result<MeshData, Wrong> {
     let Header {
         encoding,
         elements,
@@ -17,8 +19,8 @@ pub fn parse(bytes: &[u8]) -> Result<MeshData, Wrong> {
     for element in &elements {
         body.check_count(encoding, element)?;
         match element.name.as_str() {
-            "vertex" => vertices(&mut body, encoding, element, &mut mesh)?,
-            "face" => faces(&mut body, encoding, element, &mut mesh)?,
+            "vertex" => vertices(&mut body, encoding, element, wanted, &mut mesh)?,
+            "face" => faces(&mut body, encoding, element, wanted, &mut mesh)?,
             _ => (0..element.count).try_for_each(|_| {
                 let mut all = element.properties.iter();
                 all.try_for_each(|p| body.property(encoding, p, |_| Ok(())))
@@ -162,19 +164,22 @@ const SLOTS: [&[&str]; 8] = [
     &["v", "t", "texture_v", "texture_t"],
 ];
 
+fn slot_of(name: &str) -> Option<usize> {
+    SLOTS.iter().position(|names| names.contains(&name))
+}
+
 fn vertices(
     body: &mut Body<'_>,
     encoding: Encoding,
     element: &Element,
+    wanted: &[String],
     mesh: &mut MeshData,
 ) -> Result<(), Wrong> {
     if element.count >= u32::MAX as usize {
         return Err((None, "more than 4 billion vertices".into()));
     }
     let slot = |p: &Property| match p.length {
-        None => SLOTS
-            .iter()
-            .position(|names| names.contains(&p.name.as_str())),
+        None => slot_of(&p.name),
         Some(_) => None,
     };
     let slots: Vec<Option<usize>> = element.properties.iter().map(slot).collect();
@@ -184,6 +189,7 @@ fn vertices(
     }
     let (has_normals, has_uvs) = (has(&[3, 4, 5]), has(&[6, 7]));
     let (mut normals, mut uvs) = (Vec::new(), Vec::new());
+    let (mut columns, names) = Columns::new(element, |name| slot_of(name).is_some(), wanted);
     mesh.positions.reserve_exact(element.count);
     if has_normals {
         normals.reserve_exact(element.count);
@@ -193,13 +199,20 @@ fn vertices(
     }
     for i in 0..element.count {
         let mut v = [0.0; SLOTS.len()];
-        for (property, slot) in element.properties.iter().zip(&slots) {
+        for (k, (property, slot)) in element.properties.iter().zip(&slots).enumerate() {
             body.property(encoding, property, |x| {
-                if let Some(slot) = slot {
-                    v[*slot] = x;
+                match slot {
+                    Some(slot) => v[*slot] = x,
+                    None => columns.set(k, x),
                 }
                 Ok(())
             })?;
+        }
+        if !columns.finish_row(1) {
+            return Err(body.wrong(
+                encoding,
+                format!("an attribute of vertex {i} is not finite"),
+            ));
         }
         let [x, y, z, nx, ny, nz, s, t] = v;
         let p = DVec3::new(x, y, z);
@@ -218,6 +231,8 @@ fn vertices(
     }
     mesh.normals = has_normals.then_some(normals);
     mesh.uvs = has_uvs.then_some(uvs);
+    mesh.attributes.append(&mut columns.attributes);
+    mesh.attribute_names.extend(names);
     Ok(())
 }
 
@@ -225,6 +240,7 @@ fn faces(
     body: &mut Body<'_>,
     encoding: Encoding,
     element: &Element,
+    wanted: &[String],
     mesh: &mut MeshData,
 ) -> Result<(), Wrong> {
     let is_corners = |p: &Property| {
@@ -243,10 +259,11 @@ fn faces(
         0 => u32::MAX as usize,
         count => count,
     };
+    let (mut columns, names) = Columns::new(element, |_| false, wanted);
     let mut polygon = Vec::new();
     for i in 0..element.count {
         polygon.clear();
-        for property in &element.properties {
+        for (k, property) in element.properties.iter().enumerate() {
             let keep = is_corners(property);
             body.property(encoding, property, |x| {
                 if keep && !(0.0..limit as f64).contains(&x) {
@@ -256,6 +273,8 @@ fn faces(
                 }
                 if keep {
                     polygon.push(x as u32);
+                } else {
+                    columns.set(k, x);
                 }
                 Ok(())
             })?;
@@ -265,7 +284,12 @@ fn faces(
             return Err(body.wrong(encoding, what));
         }
         push_fan(&mut mesh.indices, &polygon);
+        if !columns.finish_row(polygon.len() - 2) {
+            return Err(body.wrong(encoding, format!("an attribute of face {i} is not finite")));
+        }
     }
+    mesh.attributes.append(&mut columns.attributes);
+    mesh.attribute_names.extend(names);
     Ok(())
 }
 
@@ -322,26 +346,26 @@ mod tests {
 
     #[test]
     fn the_three_encodings_give_one_mesh() {
-        let mesh = parse(ascii().as_bytes()).unwrap();
+        let mesh = parse(ascii().as_bytes(), &[]).unwrap();
         assert_eq!(mesh.indices, [[0, 1, 2], [0, 2, 3], [2, 1, 0]]);
         assert_eq!(mesh.positions[3], DVec3::new(0.0, 1.0, 0.25));
         assert_eq!(mesh.uvs.as_ref().unwrap()[2], Vec2::new(1.0, 0.5));
         assert_eq!(mesh.normals, None);
-        assert_eq!(parse(&binary(false)).unwrap(), mesh);
-        assert_eq!(parse(&binary(true)).unwrap(), mesh);
+        assert_eq!(parse(&binary(false), &[]).unwrap(), mesh);
+        assert_eq!(parse(&binary(true), &[]).unwrap(), mesh);
     }
 
     #[test]
     fn a_file_cut_anywhere_is_an_error() {
         for bytes in [binary(false), binary(true)] {
             for cut in 0..bytes.len() {
-                assert!(parse(&bytes[..cut]).is_err(), "{cut}");
+                assert!(parse(&bytes[..cut], &[]).is_err(), "{cut}");
             }
         }
         // The last digit of a text cannot be missed.
         let text = ascii();
         for cut in 0..text.len() - 1 {
-            assert!(parse(&text.as_bytes()[..cut]).is_err(), "{cut}");
+            assert!(parse(&text.as_bytes()[..cut], &[]).is_err(), "{cut}");
         }
     }
 
@@ -399,7 +423,11 @@ mod tests {
                 "\"1.5\" is not an integer",
             ),
         ] {
-            assert_eq!(parse(text.as_bytes()), Err((line, what.into())), "{text}");
+            assert_eq!(
+                parse(text.as_bytes(), &[]),
+                Err((line, what.into())),
+                "{text}"
+            );
         }
     }
 }

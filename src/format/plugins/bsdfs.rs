@@ -244,4 +244,18 @@ pub const PLUGINS: &[Plugin] = &[
         ],
         "Two by two squares per unit of texture coordinates.",
     ),
+    Plugin::new(
+        Category::Texture,
+        "mesh_attribute",
+        &[
+            Param {
+                name: "name",
+                kind: Kind::Text,
+                default: Default::Required,
+                doc: "Such as vertex_color or face_heat: numbers of the properties r, g, b or heat_1 in a PLY file.",
+            },
+            Param::float("scale", Range::NonNegative, 1.0, "Factor on the values."),
+        ],
+        "Values that a mesh carries at its vertices, interpolated, or at its faces.",
+    ),
 ];

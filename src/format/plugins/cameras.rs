@@ -1,4 +1,4 @@
-//! The scene, sensors, films, reconstruction filters, samplers and integrators.
+//! The scene, films, reconstruction filters, samplers and integrators.
 
 use super::super::limits::IMAGE_SIDE;
 use super::{Category, Default, Kind, Param, Plugin, Range, Slot};
@@ -145,72 +145,6 @@ pub const PLUGINS: &[Plugin] = &[
                 BLOCK,
             ],
             "Images of properties of the first hit, beside those of the integrators in it.",
-        )
-    },
-    Plugin {
-        slots: &[
-            Slot::new(Category::Film, 0, 1),
-            Slot::new(Category::Sampler, 0, 1),
-        ],
-        exclusive: &[("fov", "focal_length")],
-        ..Plugin::new(
-            Category::Sensor,
-            "perspective",
-            &[
-                Param::optional(
-                    "fov",
-                    Kind::Float(Range::Open(0.0, 180.0)),
-                    "Field of view in degrees along fov_axis; without it, focal_length counts.",
-                ),
-                Param {
-                    name: "focal_length",
-                    kind: Kind::Text,
-                    default: Default::Text("50mm"),
-                    doc: "Focal length of the equivalent 35 mm film (36 x 24 mm), such as 50mm.",
-                },
-                Param::choice(
-                    "fov_axis",
-                    &["x", "y", "diagonal", "smaller", "larger"],
-                    "x",
-                    "Side of the image that fov is measured along.",
-                ),
-                Param::float(
-                    "principal_point_offset_x",
-                    Range::Any,
-                    0.0,
-                    "Shift of the image centre, in image widths.",
-                ),
-                Param::float(
-                    "principal_point_offset_y",
-                    Range::Any,
-                    0.0,
-                    "Shift of the image centre, in image heights.",
-                ),
-                Param::float(
-                    "near_clip",
-                    Range::Positive,
-                    0.01,
-                    "Nearest distance seen, along the axis.",
-                ),
-                Param::float(
-                    "far_clip",
-                    Range::Positive,
-                    1e4,
-                    "Farthest distance seen, along the axis.",
-                ),
-                Param::optional(
-                    "focus_distance",
-                    Kind::Float(Range::Positive),
-                    "Accepted; without effect on a pinhole.",
-                ),
-                Param::float("shutter_open", Range::Any, 0.0, "Time the shutter opens."),
-                Param::float("shutter_close", Range::Any, 0.0, "Time the shutter closes."),
-                Param::transform(
-                    "to_world",
-                    "Places the camera; it looks along +z with +y up and +x to the left.",
-                ),
-            ],
-            "Pinhole camera.",
         )
     },
     Plugin {

@@ -1,6 +1,6 @@
 //! Emitters.
 
-use super::{Category, Param, Plugin, Range, Role};
+use super::{Category, Default, Kind, Param, Plugin, Range, Role};
 
 const WEIGHT: Param = Param::float(
     "sampling_weight",
@@ -21,11 +21,24 @@ pub const PLUGINS: &[Plugin] = &[
                 "radiance",
                 Role::Emission,
                 1.0,
-                "Radiance in W/(m² sr); a single colour so far.",
+                "Radiance in W/(m² sr); a texture follows the surface.",
             ),
             WEIGHT,
         ],
         "Light from the surface of the shape it stands in, on the side of the normal.",
+    ),
+    emitter(
+        "directionalarea",
+        &[
+            Param::color(
+                "radiance",
+                Role::Emission,
+                1.0,
+                "What a surface at right angles before it receives, in W/m²; a texture follows the surface.",
+            ),
+            WEIGHT,
+        ],
+        "Light from the surface of the shape it stands in, along the normals only.",
     ),
     Plugin {
         exclusive: &[("position", "to_world")],
@@ -38,6 +51,97 @@ pub const PLUGINS: &[Plugin] = &[
                 WEIGHT,
             ],
             "Light from a point, equal in all directions.",
+        )
+    },
+    emitter(
+        "spot",
+        &[
+            Param::color(
+                "intensity",
+                Role::Emission,
+                1.0,
+                "Intensity along the axis in W/sr.",
+            ),
+            Param::float(
+                "cutoff_angle",
+                Range::Closed(0.0, 180.0),
+                20.0,
+                "Angle from the axis, in degrees, at which the light ends.",
+            ),
+            Param::optional(
+                "beam_width",
+                Kind::Float(Range::Closed(0.0, 180.0)),
+                "Angle up to which the intensity is full; three quarters of cutoff_angle if not given.",
+            ),
+            Param::optional(
+                "texture",
+                Kind::Color(Role::Emission),
+                "A texture that multiplies the intensity, laid around the cone.",
+            ),
+            Param::transform("to_world", "Stands at the origin, shines along +z."),
+            WEIGHT,
+        ],
+        "Light from a point into a cone.",
+    ),
+    Plugin {
+        exclusive: &[("fov", "focal_length")],
+        ..emitter(
+            "projector",
+            &[
+                Param::color(
+                    "irradiance",
+                    Role::Emission,
+                    1.0,
+                    "The picture; a surface before its middle receives pi times this over the squared distance.",
+                ),
+                Param::float(
+                    "scale",
+                    Range::NonNegative,
+                    1.0,
+                    "Factor on the irradiance.",
+                ),
+                Param::optional(
+                    "fov",
+                    Kind::Float(Range::Open(0.0, 180.0)),
+                    "Angle in degrees that the picture spans along fov_axis; without it, focal_length counts.",
+                ),
+                Param {
+                    name: "focal_length",
+                    kind: Kind::Text,
+                    default: Default::Text("50mm"),
+                    doc: "Focal length of the equivalent 35 mm film (36 x 24 mm), such as 50mm.",
+                },
+                Param::choice(
+                    "fov_axis",
+                    &["x", "y", "diagonal", "smaller", "larger"],
+                    "x",
+                    "Side of the picture that fov is measured along.",
+                ),
+                Param::transform(
+                    "to_world",
+                    "As of a camera: +z ahead, +y up, +x to the left.",
+                ),
+                WEIGHT,
+            ],
+            "A picture thrown from a point.",
+        )
+    },
+    Plugin {
+        exclusive: &[("direction", "to_world")],
+        ..emitter(
+            "directional",
+            &[
+                Param::color(
+                    "irradiance",
+                    Role::Emission,
+                    1.0,
+                    "Irradiance in W/m² on a surface at right angles to the light.",
+                ),
+                Param::optional("direction", Kind::Vector, "Where the light travels."),
+                Param::transform("to_world", "Light travels along the image of +z."),
+                WEIGHT,
+            ],
+            "Parallel light from infinity.",
         )
     },
     emitter(

@@ -9,7 +9,9 @@ mod bsdfs;
 mod cameras;
 mod lights;
 mod reference;
+mod sensors;
 mod shapes;
+mod spectra;
 mod unsupported;
 
 pub use reference::reference;
@@ -148,6 +150,8 @@ pub enum Kind {
     Vector,
     /// An affine map of space.
     Transform,
+    /// An affine map of space that may change over time.
+    Motion,
     /// A colour, or a texture of colours.
     Color(Role),
     /// A number, or a texture of numbers.
@@ -173,6 +177,7 @@ impl Kind {
             Kind::Point => "a point".into(),
             Kind::Vector => "a vector".into(),
             Kind::Transform => "a transform".into(),
+            Kind::Motion => "a transform or an animation".into(),
             Kind::Color(Role::Reflectance) => "a colour or texture within 0 to 1".into(),
             Kind::Color(_) => "a colour or texture".into(),
             Kind::FloatTexture(range) => format!("{range}, or a texture"),
@@ -189,7 +194,7 @@ impl Kind {
             Kind::Text | Kind::Choice(_) | Kind::File => "string",
             Kind::Point => "point",
             Kind::Vector => "vector",
-            Kind::Transform => "transform",
+            Kind::Transform | Kind::Motion => "transform",
             Kind::Color(_) => "rgb",
         }
     }
@@ -313,6 +318,16 @@ impl Param {
         }
     }
 
+    /// A transform that an `<animation>` may move.
+    pub(super) const fn motion(name: &'static str, doc: &'static str) -> Param {
+        Param {
+            name,
+            kind: Kind::Motion,
+            default: Default::Identity,
+            doc,
+        }
+    }
+
     pub(super) const fn file(name: &'static str, doc: &'static str) -> Param {
         Param {
             name,
@@ -400,9 +415,11 @@ impl fmt::Display for Plugin {
 pub fn all() -> impl Iterator<Item = &'static Plugin> {
     [
         cameras::PLUGINS,
+        sensors::PLUGINS,
         shapes::PLUGINS,
         bsdfs::PLUGINS,
         lights::PLUGINS,
+        spectra::PLUGINS,
     ]
     .into_iter()
     .flatten()
@@ -438,7 +455,7 @@ mod tests {
                 (Kind::Text, Default::Text(_)) => true,
                 (Kind::Ior, Default::Text(medium)) => iors::lookup(medium).is_some(),
                 (Kind::Point | Kind::Vector, Default::Point(_)) => true,
-                (Kind::Transform, Default::Identity) => true,
+                (Kind::Transform | Kind::Motion, Default::Identity) => true,
                 _ => false,
             };
             assert!(good, "{} {}: {}", plugin.category, plugin.name, p.name);

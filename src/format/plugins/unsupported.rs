@@ -10,18 +10,15 @@ const DERIVATIVE: &str = "luxel computes no derivatives; use the integrator \"pa
 const RGB: &str = "luxel renders in RGB; write the colour with <rgb>";
 const BAKE: &str = "bake the texture into an image and use the texture \"bitmap\"";
 const NEAR_BSDF: &str = "use the nearest of diffuse, conductor, roughconductor and dielectric";
-const PINHOLE: &str = "use the sensor \"perspective\"";
 
 const TABLE: &[(Category, &[&str], &str)] = &[
     (
         Shape,
         &[
-            "serialized",
             "bsplinecurve",
             "linearcurve",
             "ellipsoids",
             "ellipsoidsmesh",
-            "sdfgrid",
             "heightfield",
             "hair",
             "deformable",
@@ -29,11 +26,6 @@ const TABLE: &[(Category, &[&str], &str)] = &[
             "merge",
         ],
         MESH,
-    ),
-    (
-        Shape,
-        &["shapegroup", "instance"],
-        "write the shape out at each place where it stands",
     ),
     (
         Bsdf,
@@ -78,10 +70,6 @@ const TABLE: &[(Category, &[&str], &str)] = &[
     (
         Emitter,
         &[
-            "spot",
-            "directional",
-            "directionalarea",
-            "projector",
             "collimated",
             "sun",
             "sky",
@@ -89,26 +77,12 @@ const TABLE: &[(Category, &[&str], &str)] = &[
             "volumelight",
             "timed_sunsky",
         ],
-        "use an area light, a point light or an environment map",
+        "use a directional light, an area light or an environment map",
     ),
+    (Texture, &["rawconstant", "discrete"], RGB),
     (
         Texture,
         &[
-            "uniform",
-            "d65",
-            "blackbody",
-            "regular",
-            "irregular",
-            "srgb",
-            "rawconstant",
-            "discrete",
-        ],
-        RGB,
-    ),
-    (
-        Texture,
-        &[
-            "mesh_attribute",
             "volume",
             "vertexcolors",
             "scale",
@@ -121,25 +95,18 @@ const TABLE: &[(Category, &[&str], &str)] = &[
     (
         Sensor,
         &[
-            "thinlens",
-            "orthographic",
             "spherical",
             "telecentric",
             "perspective_rdist",
             "batch",
+            "mpath",
         ],
-        PINHOLE,
+        "use one of the sensors \"perspective\", \"thinlens\" and \"orthographic\"",
     ),
     (
         Sensor,
-        &[
-            "radiancemeter",
-            "irradiancemeter",
-            "fluencemeter",
-            "distant",
-            "mpath",
-        ],
-        PINHOLE,
+        &["fluencemeter"],
+        "use the sensor \"irradiancemeter\" inside a shape",
     ),
     (
         Film,

@@ -16,7 +16,7 @@ pub(super) struct Attribute {
     pub at: Span,
 }
 
-pub(super) const VALUE_TAGS: [&str; 9] = [
+pub(super) const VALUE_TAGS: [&str; 10] = [
     "integer",
     "float",
     "boolean",
@@ -26,6 +26,7 @@ pub(super) const VALUE_TAGS: [&str; 9] = [
     "point",
     "vector",
     "transform",
+    "animation",
 ];
 const OTHER_TAGS: [&str; 5] = ["default", "include", "path", "alias", "ref"];
 pub(super) const STEP_TAGS: [&str; 5] = ["translate", "scale", "rotate", "lookat", "matrix"];

@@ -19,7 +19,8 @@ impl Loader {
         let name = self.required(file, node, "name")?;
         let mut value_at = tag_span(file.index, node);
         let value = match tag {
-            "transform" => Value::Transform(Box::new(self.transform(file, node)?)),
+            "transform" => Value::Transform(Box::new(self.transform(file, node, "name")?)),
+            "animation" => Value::Animation(self.animation(file, node)?),
             "point" | "vector" => {
                 self.leaf(file, node, &["name", "value", "x", "y", "z"])?;
                 let (v, at) = self.xyz(file, node, None)?;
@@ -71,9 +72,52 @@ impl Loader {
             })
     }
 
-    /// The steps of a transform; each acts after those before it.
-    fn transform(&mut self, file: File<'_>, parent: Node<'_, '_>) -> Result<Transform, SceneError> {
+    /// Transforms at increasing times.
+    fn animation(
+        &mut self,
+        file: File<'_>,
+        parent: Node<'_, '_>,
+    ) -> Result<Vec<(f64, Transform)>, SceneError> {
         self.check_attributes(file, parent, &["name"])?;
+        let mut keys: Vec<(f64, Transform)> = Vec::new();
+        for node in parent.children() {
+            if node.is_text() {
+                self.check_text(file, node)?;
+            }
+            if !node.is_element() {
+                continue;
+            }
+            let tag = node.tag_name().name();
+            if tag != "transform" {
+                let what = format!("unknown element <{tag}> in <animation>");
+                return Err(self
+                    .error(tag_span(file.index, node), what)
+                    .with_help("an animation is made of <transform time=\"...\">"));
+            }
+            let transform = self.transform(file, node, "time")?;
+            let at = self.required(file, node, "time")?;
+            let time = values::float(&at.text).map_err(|wrong| self.wrong(at.at, wrong))?;
+            if let Some((before, _)) = keys.last().filter(|key| key.0 >= time) {
+                let what = format!("times must increase, but {time} follows {before}");
+                return Err(self.error(at.at, what));
+            }
+            keys.push((time, transform));
+        }
+        if keys.is_empty() {
+            let what = "an <animation> needs at least one <transform time=\"...\">";
+            return Err(self.error(tag_span(file.index, parent), what));
+        }
+        Ok(keys)
+    }
+
+    /// The steps of a transform; each acts after those before it. `attribute` is the one it may have.
+    fn transform(
+        &mut self,
+        file: File<'_>,
+        parent: Node<'_, '_>,
+        attribute: &str,
+    ) -> Result<Transform, SceneError> {
+        self.check_attributes(file, parent, &[attribute])?;
         let mut transform = Transform::IDENTITY;
         for node in parent.children() {
             if node.is_text() {

@@ -12,6 +12,7 @@ mod values;
 
 pub(super) use loader::Loader;
 pub(super) use parameters::Parameters;
+pub(super) use values::floats;
 
 use super::error::{SceneError, Source, did_you_mean, whole_file};
 use super::limits;

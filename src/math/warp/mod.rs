@@ -120,6 +120,16 @@ pub fn triangle(u: Vec2) -> Vec2 {
     }
 }
 
+/// The `u` for which [`triangle`] returns the weights `b`.
+#[inline]
+pub fn triangle_inverse(b: Vec2) -> Vec2 {
+    if b.y > b.x {
+        Vec2::new(2.0 * b.x, b.x + b.y)
+    } else {
+        Vec2::new(b.x + b.y, 2.0 * b.y)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -12,8 +12,10 @@ use crate::math::Rgb;
 use crate::scene::{MaterialId, Plan};
 use crate::texture::{Picture, Texture};
 
+use super::attributes::Attributes;
 use super::suggest;
 
+mod attribute;
 mod composed;
 mod textures;
 
@@ -25,12 +27,17 @@ pub struct Materials<'a> {
     default: [Option<MaterialId>; 2],
     textures: HashMap<ObjectId, Texture>,
     pictures: HashMap<(PathBuf, bool), Arc<Picture>>,
+    attributes: Attributes,
+    /// The shape whose material or emitter is being compiled.
+    shape: Option<ObjectId>,
+    /// Whether what was compiled depends on that shape, so that no other may share it.
+    per_shape: bool,
     /// What was mended, for the user to know.
     warnings: Vec<String>,
 }
 
 impl<'a> Materials<'a> {
-    pub fn new(desc: &'a SceneDesc) -> Materials<'a> {
+    pub fn new(desc: &'a SceneDesc, attributes: Attributes) -> Materials<'a> {
         Materials {
             desc,
             materials: Vec::new(),
@@ -38,6 +45,9 @@ impl<'a> Materials<'a> {
             default: [None; 2],
             textures: HashMap::new(),
             pictures: HashMap::new(),
+            attributes,
+            shape: None,
+            per_shape: false,
             warnings: Vec::new(),
         }
     }
@@ -70,6 +80,12 @@ impl<'a> Materials<'a> {
         self.materials
     }
 
+    /// Says whose material or emitter is compiled next.
+    pub fn enter(&mut self, shape: Option<&Props>) {
+        self.shape = shape.map(|s| s.object_id());
+        self.per_shape = false;
+    }
+
     pub fn of_shape(&mut self, shape: &Props<'a>) -> Result<MaterialId, SceneError> {
         let Some(props) = shape.child(Category::Bsdf) else {
             let emits = !shape.children(Category::Emitter).is_empty();
@@ -84,10 +100,13 @@ impl<'a> Materials<'a> {
         if let Some(id) = self.ids.get(&props.object_id()) {
             return Ok(*id);
         }
+        self.enter(Some(shape));
         let material = self.material(&props)?.folded();
         self.materials.push(material);
         let id = MaterialId(self.materials.len() as u32 - 1);
-        self.ids.insert(props.object_id(), id);
+        if !self.per_shape {
+            self.ids.insert(props.object_id(), id);
+        }
         Ok(id)
     }
 

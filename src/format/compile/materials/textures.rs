@@ -38,6 +38,7 @@ impl<'a> Materials<'a> {
                 }
                 Texture::Bitmap(bitmap)
             }
+            Texture::MeshAttribute(a) => Texture::MeshAttribute(self.share(p, name, a)),
             other => other,
         })
     }
@@ -45,11 +46,15 @@ impl<'a> Materials<'a> {
     pub(super) fn scalar(&mut self, p: &Props<'a>, name: &str) -> Result<Texture, SceneError> {
         match p.float_or_texture(name)? {
             FloatOrTexture::Float(v) => Ok(Texture::Constant(Rgb::splat(v as f32))),
-            FloatOrTexture::Texture(id) => self.texture(id),
+            FloatOrTexture::Texture(id) => {
+                let texture = self.texture(id)?;
+                self.check_scalar(id)?;
+                Ok(texture)
+            }
         }
     }
 
-    pub(super) fn resolve(&mut self, value: RgbOrTexture) -> Result<Texture, SceneError> {
+    pub fn resolve(&mut self, value: RgbOrTexture) -> Result<Texture, SceneError> {
         match value {
             RgbOrTexture::Rgb(c) => Ok(Texture::Constant(c)),
             RgbOrTexture::Texture(id) => self.texture(id),
@@ -61,7 +66,11 @@ impl<'a> Materials<'a> {
             return Ok(texture.clone());
         }
         let p = self.desc.object(id);
+        if p.plugin() == "mesh_attribute" {
+            return self.mesh_attribute(&p);
+        }
         let to_uv = affine2(&p.transform("to_uv")?);
+        let outer = std::mem::take(&mut self.per_shape);
         let texture = match p.plugin() {
             "checkerboard" => Texture::Checkerboard(Box::new(Checkerboard {
                 color0: self.reflectance(&p, "color0")?,
@@ -71,8 +80,23 @@ impl<'a> Materials<'a> {
             _ => self.bitmap(&p, to_uv)?,
         };
         let texture = texture.folded();
-        self.textures.insert(id, texture.clone());
+        if !self.per_shape {
+            self.textures.insert(id, texture.clone());
+        }
+        self.per_shape |= outer;
         Ok(texture)
+    }
+
+    /// Width and height of the picture that a texture shows, also where it folded into one colour; 1 by 1 for
+    /// any other texture. Of those that are compiled already.
+    pub fn picture_size(&self, id: ObjectId) -> [u32; 2] {
+        let p = self.desc.object(id);
+        let key = match (p.plugin(), p.file("filename"), p.bool("raw")) {
+            ("bitmap", Ok(file), Ok(raw)) => (file.to_path_buf(), raw),
+            _ => return [1; 2],
+        };
+        let picture = self.pictures.get(&key);
+        picture.map_or([1; 2], |picture| [picture.width, picture.height])
     }
 
     fn bitmap(&mut self, p: &Props<'a>, to_uv: Affine2) -> Result<Texture, SceneError> {

@@ -1,10 +1,9 @@
-//! Where camera rays come from.
+//! The perspective camera: pinhole or thin lens.
 
-use glam::{DVec3, Mat3};
-
+use super::{CameraSample, Lens, Pose};
 use crate::film::FilmSpec;
 use crate::geom::Ray;
-use crate::math::{Transform, Vec2, Vec3};
+use crate::math::Vec2;
 
 /// Which side of the picture the field of view spans.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,46 +15,49 @@ pub enum FovAxis {
     Larger,
 }
 
+impl FovAxis {
+    /// Half the width, at unit depth, of a picture of `width` by `height` that `fov_deg` spans along this.
+    pub fn half_width(self, fov_deg: f64, width: f64, height: f64) -> f64 {
+        let (w, h) = (width, height);
+        (0.5 * fov_deg.to_radians()).tan()
+            * match self {
+                FovAxis::X => 1.0,
+                FovAxis::Y => w / h,
+                FovAxis::Diagonal => w / w.hypot(h),
+                FovAxis::Smaller => (w / h).max(1.0),
+                FovAxis::Larger => (w / h).min(1.0),
+            }
+    }
+}
+
 /// What makes a perspective camera; distances in scene units.
 #[derive(Clone, Copy, Debug)]
 pub struct PerspectiveSpec {
-    /// Camera to world: looks along +z, +y up, +x to the left.
-    pub to_world: Transform,
     pub fov_deg: f64,
     pub fov_axis: FovAxis,
     /// Shift of the picture, as a fraction of its width and height.
     pub principal_point_offset: [f64; 2],
     pub near_clip: f64,
     pub far_clip: f64,
+    pub lens: Lens,
 }
 
-/// A pinhole camera.
-#[derive(Clone, Debug)]
-pub struct Camera {
-    origin: Vec3,
-    /// Columns: the camera's axes in world space.
-    axes: Mat3,
-    /// Direction (at unit depth) of the picture's top left corner, and its change per pixel.
+/// A camera whose rays meet the plane of the picture from one opening.
+#[derive(Clone, Copy, Debug)]
+pub struct Perspective {
+    /// Direction (at unit depth) of the picture's top left corner from the middle of the lens, and its
+    /// change per pixel.
     corner: Vec2,
     per_pixel: Vec2,
     near: f32,
     far: f32,
+    lens: Lens,
 }
 
-impl Camera {
-    /// `center` is the point of the world that the scene's coordinates are relative to.
-    pub fn perspective(spec: &PerspectiveSpec, film: &FilmSpec, center: DVec3) -> Camera {
+impl Perspective {
+    pub fn new(spec: &PerspectiveSpec, film: &FilmSpec) -> Perspective {
         let (w, h) = (f64::from(film.width), f64::from(film.height));
-        let tan = (0.5 * spec.fov_deg.to_radians()).tan();
-        // Half the width of the picture at unit depth.
-        let half_width = tan
-            * match spec.fov_axis {
-                FovAxis::X => 1.0,
-                FovAxis::Y => w / h,
-                FovAxis::Diagonal => w / w.hypot(h),
-                FovAxis::Smaller => (w / h).max(1.0),
-                FovAxis::Larger => (w / h).min(1.0),
-            };
+        let half_width = spec.fov_axis.half_width(spec.fov_deg, w, h);
         // x = half_width (1 - 2 (px / w + offset)), likewise y with half_width h / w.
         let [ox, oy] = spec.principal_point_offset;
         let half_height = half_width * h / w;
@@ -67,27 +69,54 @@ impl Camera {
             (-2.0 * half_width / w) as f32,
             (-2.0 * half_height / h) as f32,
         );
-        let axis = |v: DVec3| spec.to_world.vector(v).normalize().as_vec3();
-        Camera {
-            origin: (spec.to_world.point(DVec3::ZERO) - center).as_vec3(),
-            axes: Mat3::from_cols(axis(DVec3::X), axis(DVec3::Y), axis(DVec3::Z)),
+        Perspective {
             corner,
             per_pixel,
             near: spec.near_clip as f32,
             far: spec.far_clip as f32,
+            lens: spec.lens,
         }
     }
 
-    /// The ray through the point `p` of the picture, in pixels from its top left corner. It begins on
-    /// the near plane and ends on the far plane.
+    pub fn lens(&self) -> Lens {
+        self.lens
+    }
+
+    /// How far a ray may go per unit of depth, over the whole picture and lens.
+    pub fn largest_slope(&self, film: &FilmSpec) -> f32 {
+        let size = Vec2::new(film.width as f32, film.height as f32);
+        let opposite = self.corner + self.per_pixel * size;
+        let lens = match self.lens {
+            Lens::Pinhole => 0.0,
+            Lens::Thin { slope, .. } => slope,
+        };
+        1.0 + lens + self.corner.abs().max(opposite.abs()).length()
+    }
+
+    /// The ray from a point of the lens to where the plane of focus shows the point of the picture. It
+    /// begins on the near plane and ends on the far plane.
     #[inline]
-    pub fn ray(&self, p: Vec2) -> Ray {
-        let d = (self.corner + self.per_pixel * p).extend(1.0);
+    pub fn ray(&self, pose: &Pose, sample: &CameraSample) -> Ray {
+        let d = self.corner + self.per_pixel * sample.film;
+        let (d, start) = match self.lens {
+            Lens::Pinhole => (d, pose.origin),
+            Lens::Thin {
+                radius,
+                slope,
+                aperture,
+            } => {
+                let point = aperture.sample(sample.lens);
+                // At unit depth, whatever the focal distance: it may be beyond all numbers.
+                let on_lens = radius * (pose.axes.x_axis * point.x + pose.axes.y_axis * point.y);
+                (d - slope * point, pose.origin + on_lens)
+            }
+        };
+        let d = d.extend(1.0);
         let length = d.length();
-        let d = self.axes * (d / length);
+        let d = pose.axes * (d / length);
         let near = self.near * length;
         Ray {
-            o: self.origin + d * near,
+            o: start + d * near,
             d,
             t_max: self.far * length - near,
             time: 0.0,
@@ -97,8 +126,10 @@ impl Camera {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Camera, View};
     use super::*;
     use crate::film::{Filter, Window};
+    use crate::math::{DVec3, Motion, Transform, Vec3};
 
     fn film() -> FilmSpec {
         let crop = Window {
@@ -117,13 +148,21 @@ mod tests {
 
     fn spec() -> PerspectiveSpec {
         PerspectiveSpec {
-            to_world: Transform::IDENTITY,
             fov_deg: 40.0,
             fov_axis: FovAxis::X,
             principal_point_offset: [0.0; 2],
             near_clip: 1e-2,
             far_clip: 1e4,
+            lens: Lens::Pinhole,
         }
+    }
+
+    fn ray(spec: &PerspectiveSpec, center: DVec3) -> Ray {
+        let view = View::new(&Motion::still(Transform::IDENTITY), center);
+        let camera = Camera::perspective(view, Perspective::new(spec, &film()));
+        camera
+            .ray(&CameraSample::central(Vec2::new(60.0, 20.0)))
+            .ray
     }
 
     #[test]
@@ -168,7 +207,7 @@ mod tests {
             ),
         ];
         for (spec, want) in table {
-            let ray = Camera::perspective(&spec, &film(), DVec3::ZERO).ray(Vec2::new(60.0, 20.0));
+            let ray = ray(&spec, DVec3::ZERO);
             assert!(
                 (ray.d - Vec3::from_array(want)).length() < 2e-6,
                 "{spec:?}: {}",
@@ -184,8 +223,7 @@ mod tests {
             far_clip: 10.0,
             ..spec()
         };
-        let ray = Camera::perspective(&spec, &film(), DVec3::new(0.0, 0.0, -3.0))
-            .ray(Vec2::new(60.0, 20.0));
+        let ray = ray(&spec, DVec3::new(0.0, 0.0, -3.0));
         assert!(
             (ray.o - Vec3::new(0.145_588, 0.109_191, 4.0)).length() < 1e-5,
             "{}",

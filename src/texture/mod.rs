@@ -2,6 +2,8 @@
 //!
 //! Texel (0, 0) is the top left of the picture and lies at uv (0, 0); texel centres are at half-integers.
 
+mod attribute;
+
 use std::sync::{Arc, LazyLock};
 
 use glam::Affine2;
@@ -9,12 +11,15 @@ use glam::Affine2;
 use crate::image_io::color::srgb_to_linear;
 use crate::math::{Rgb, Vec2};
 
+pub use attribute::{AttributeValues, MeshAttribute};
+
 /// A colour as a function of the surface parameters.
 #[derive(Clone, Debug)]
 pub enum Texture {
     Constant(Rgb),
     Bitmap(Bitmap),
     Checkerboard(Box<Checkerboard>),
+    MeshAttribute(MeshAttribute),
 }
 
 /// A place on a surface, as textures see it.
@@ -35,6 +40,7 @@ impl Texture {
             Texture::Constant(c) => *c,
             Texture::Bitmap(b) => b.eval(at.uv),
             Texture::Checkerboard(c) => c.eval(at),
+            Texture::MeshAttribute(a) => a.eval(at),
         }
     }
 
@@ -48,7 +54,9 @@ impl Texture {
     pub fn gradient(&self, uv: Vec2) -> Vec2 {
         match self {
             Texture::Bitmap(b) => b.gradient(uv),
-            Texture::Constant(_) | Texture::Checkerboard(_) => Vec2::ZERO,
+            Texture::Constant(_) | Texture::Checkerboard(_) | Texture::MeshAttribute(_) => {
+                Vec2::ZERO
+            }
         }
     }
 
@@ -57,6 +65,7 @@ impl Texture {
         let single = match &self {
             Texture::Constant(c) => Some(*c),
             Texture::Bitmap(b) => b.texels.single_color(),
+            Texture::MeshAttribute(a) => a.single_color(),
             Texture::Checkerboard(c) => match (&c.color0, &c.color1) {
                 (Texture::Constant(a), Texture::Constant(b)) if a == b => Some(*a),
                 _ => None,

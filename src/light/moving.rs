@@ -1,0 +1,90 @@
+//! Shining surfaces that move: a receiver sees them from their own coordinates, as they stand at its time.
+
+use super::local::Towards;
+use super::tree::LightBounds;
+use crate::geom::Endpoint;
+use crate::geom::world::{normal, point};
+use crate::math::{DVec3, Motion, Transform, Vec3};
+
+/// A surface at one time.
+pub(super) struct Moved {
+    to_world: Transform,
+    to_local: Transform,
+}
+
+impl Moved {
+    pub fn new(motion: &Motion, time: f32) -> Moved {
+        let to_world = motion.at(time);
+        Moved {
+            to_world,
+            to_local: to_world.inverse(),
+        }
+    }
+
+    /// A point of the world in the coordinates of the surface.
+    pub fn into(&self, p: Vec3) -> Vec3 {
+        self.to_local.point(p.as_dvec3()).as_vec3()
+    }
+
+    /// A unit normal of the world there.
+    pub fn normal_into(&self, n: Vec3) -> Vec3 {
+        normal(&self.to_local, n)
+    }
+
+    /// A connection found there, in the world for the receiver at `eye`. `None` as for
+    /// [`Part::sample`](super::local::Part::sample).
+    pub fn out(&self, local: &Towards, eye: Vec3) -> Option<Towards> {
+        let (p, p_err) = point(&self.to_world, local.end.p, local.end.p_err);
+        let d = (p - eye).as_dvec3();
+        let wi = d.try_normalize()?.as_vec3();
+        let pdf = (f64::from(local.pdf) * self.density(local.wi.as_dvec3())) as f32;
+        (pdf > 0.0 && pdf < f32::MAX).then(|| Towards {
+            end: Endpoint {
+                p,
+                p_err,
+                ng: normal(&self.to_world, local.end.ng),
+            },
+            wi,
+            dist: d.length() as f32,
+            pdf,
+        })
+    }
+
+    /// A density per steradian of the surface's coordinates, in the direction of `w` there, as one of the
+    /// world.
+    pub fn pdf_out(&self, pdf: f32, w: Vec3) -> f32 {
+        let w = w.as_dvec3().normalize_or_zero();
+        let pdf = f64::from(pdf) * self.density(w);
+        match pdf > 0.0 {
+            true => pdf.clamp(f64::from(f32::MIN_POSITIVE), f64::from(f32::MAX)) as f32,
+            false => 0.0,
+        }
+    }
+
+    /// The factor of that, for the unit vector `w`: dω_world = |det M| / |M w|³ dω_local, as the volume of
+    /// a thin cone shows.
+    fn density(&self, w: DVec3) -> f64 {
+        let m = self.to_world.matrix().matrix3;
+        (m * w).length().powi(3) / m.determinant().abs()
+    }
+}
+
+/// What the choice of a light is to know of a part that is `bounds` in its own coordinates.
+pub(super) fn bounds(motion: &Motion, bounds: LightBounds) -> LightBounds {
+    let middle = motion.at(0.5);
+    // The area grows as the square of the scale does; the power only guides the choice.
+    let scale = middle.matrix().matrix3.determinant().abs().cbrt();
+    let flat = bounds.cos_spread == 1.0 && motion.only_translates();
+    let (axis, cos_spread) = match flat {
+        true => (normal(&middle, bounds.axis), 1.0),
+        false => (Vec3::Z, -1.0),
+    };
+    let power = f64::from(bounds.power) * scale * scale;
+    LightBounds {
+        bounds: motion.bounds(bounds.bounds, 0.0, 1.0),
+        axis,
+        cos_spread,
+        power: power.clamp(f64::from(f32::MIN_POSITIVE), f64::from(f32::MAX)) as f32,
+        ..bounds
+    }
+}
