@@ -35,6 +35,19 @@ fn main() {
         ))
     };
     let plain = cube(r#"<ref id="white"/>"#);
+    const PLACE: &str = r#"<scale value="0.15"/><translate y="0.15"/>"#;
+    let instance = boxed(&format!(
+        r#"<shape type="shapegroup" id="group"><shape type="cube"><ref id="white"/></shape></shape>
+        <shape type="instance"><ref id="group"/><transform name="to_world">{PLACE}</transform></shape>"#
+    ));
+    let moving = |way: &str| {
+        let moving = boxed(&format!(
+            r#"<shape type="cube"><animation name="to_world"><transform time="0">{PLACE}</transform>
+            <transform time="1">{PLACE}{way}</transform></animation><ref id="white"/></shape>"#
+        ));
+        let shutter = r#"<sensor type="perspective"><float name="shutter_close" value="1"/>"#;
+        moving.replace(r#"<sensor type="perspective">"#, shutter)
+    };
     let scenes = [
         ("plain", plain.clone()),
         (
@@ -63,6 +76,14 @@ fn main() {
                 <ref id="white"/></shape>"#,
             ),
         ),
+        ("instance in place of the cube", instance),
+        ("cube that turns", moving(r#"<rotate y="1" angle="40"/>"#)),
+        ("cube that flies", moving(r#"<translate x="0.5" y="0.4"/>"#)),
+        (
+            "cube that flies fast",
+            moving(r#"<translate x="30" y="20"/>"#),
+        ),
+        ("cube that does not move", moving("")),
         ("balls of glass and gold", balls.to_string()),
     ];
     let mut criterion = Criterion::default()

@@ -263,10 +263,7 @@ fn connections_to_lights_that_stretch_follow_their_density() {
     let shapes = [
         ("sphere", Geometry::Sphere(Sphere::new(one, false).unwrap())),
         ("disk", Geometry::Disk(Disk::new(one, false))),
-        (
-            "cylinder",
-            Geometry::Cylinder(Cylinder::new(one, false).unwrap()),
-        ),
+        ("cylinder", Geometry::Cylinder(Cylinder::new(one, false))),
         ("rectangle", Geometry::Mesh(Mesh::rectangle(&one, false))),
         ("cube", Geometry::Mesh(Mesh::cube(&one, false))),
     ];

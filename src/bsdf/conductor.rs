@@ -48,61 +48,26 @@ pub struct RoughConductor {
     pub metal: Conductor,
 }
 
-/// The facet normal that reflects two directions into each other.
-struct HalfVector {
-    m: Vec3,
-    /// D(m), > 0.
-    d: f32,
-    /// Cosine between `m` and either direction.
-    cos: f32,
-}
-
 impl RoughConductor {
     #[inline]
     pub(super) fn eval_pdf(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
-        let Some(half) = self.half_vector(wo, wi) else {
+        let Some(half) = self.facets.half_vector(wo, wi) else {
             return (Rgb::BLACK, 0.0);
         };
         let masking = self.facets.g1_over_cos(wo);
         let f = 0.25 * half.d * (masking * self.facets.g1_over_cos(wi));
-        let pdf = self.reflected_pdf(half.d, masking, half.m.z, half.cos);
+        let pdf = self
+            .facets
+            .reflected_pdf(half.d, masking, half.m.z, half.cos);
         (self.metal.fresnel(half.cos) * f, pdf)
     }
 
     #[inline]
     pub(super) fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
-        self.half_vector(wo, wi).map_or(0.0, |half| {
+        self.facets.half_vector(wo, wi).map_or(0.0, |half| {
             let masking = self.facets.g1_over_cos(wo);
-            self.reflected_pdf(half.d, masking, half.m.z, half.cos)
-        })
-    }
-
-    /// Density of the reflected direction: that of the facet normal over 4 cos (Walter et al. 2007,
-    /// equation 14). `masking` is G1(wo) / wo.z, `cos` the angle between facet normal and `wo`.
-    #[inline]
-    fn reflected_pdf(&self, d: f32, masking: f32, m_z: f32, cos: f32) -> f32 {
-        if self.facets.visible {
-            0.25 * d * masking
-        } else {
-            0.25 * d * m_z / cos
-        }
-    }
-
-    #[inline]
-    fn half_vector(&self, wo: Vec3, wi: Vec3) -> Option<HalfVector> {
-        if wo.z <= 0.0 || wi.z <= 0.0 {
-            return None;
-        }
-        let h = wo + wi;
-        let length = h.length();
-        let m = h / length;
-        let d = self.facets.d(m);
-        // Half the sum of two unit vectors has the length of the cosine: the same from both ends, so that
-        // the value is reciprocal to the last digits also where both graze the surface.
-        (length > 0.0 && d > 0.0).then_some(HalfVector {
-            m,
-            d,
-            cos: (0.5 * length).min(1.0),
+            self.facets
+                .reflected_pdf(half.d, masking, half.m.z, half.cos)
         })
     }
 
@@ -122,7 +87,7 @@ impl RoughConductor {
         let d = self.facets.d(m);
         let shadowing = self.facets.g1_over_cos(wi) * wi.z;
         let masking = self.facets.g1_over_cos(wo);
-        let pdf = self.reflected_pdf(d, masking, m.z, cos);
+        let pdf = self.facets.reflected_pdf(d, masking, m.z, cos);
         let weight = if self.facets.visible {
             shadowing
         } else {

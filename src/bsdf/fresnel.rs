@@ -27,6 +27,30 @@ pub fn dielectric(cos: f32, eta: f32) -> (f32, f32) {
     ((0.5 * (s * s + p * p)).min(1.0), g / eta)
 }
 
+/// Share of light that passes the boundary between two dielectrics when it arrives equally from all
+/// directions; `eta` = index beyond / index on the side it comes from, 1e-12..1e12.
+///
+/// Closed form for light from the thinner side (Walsh 1926, in Duntley 1942, equation 18); from the denser
+/// side it is `eta²` times as much, as that light is confined to the critical cone.
+pub fn diffuse_through(eta: f64) -> f64 {
+    if eta < 1.0 {
+        return diffuse_through(1.0 / eta) * eta * eta;
+    }
+    let (n, d) = (eta, eta - 1.0);
+    // So near to 1 the terms cancel, and next to nothing is reflected.
+    if d < 1e-9 {
+        return 1.0;
+    }
+    let (n2, s) = (n * n, n + 1.0);
+    let (plus, minus) = (n2 + 1.0, d * s);
+    let fourth = plus * minus; // n⁴ - 1
+    let a = 0.5 - d * (3.0 * n + 1.0) / (6.0 * s * s);
+    let b = n2 * minus * minus / (plus * plus * plus) * (d / s).ln();
+    let c = 2.0 * n2 * n * (n2 + 2.0 * n - 1.0) / (plus * fourth);
+    let e = 8.0 * n2 * n2 * (n2 * n2 + 1.0) / (plus * fourth * fourth) * d.ln_1p();
+    (a - b + c - e).clamp(0.0, 1.0)
+}
+
 /// Reflectance of a conductor of complex index `eta + i k` relative to the medium outside, per channel.
 ///
 /// `cos` in 0..1; `eta`, `k` >= 0. `eta` = 0 reflects everything, which is the material "none".
@@ -92,6 +116,29 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Against the integral of twice the cosine times what passes.
+    #[test]
+    fn diffuse_light_passes_by_the_mean_over_all_angles() {
+        for eta in [
+            0.1, 0.25, 0.5, 0.75, 0.9999, 1.0, 1.0001, 1.01, 1.5, 4.0, 1e3,
+        ] {
+            let n = 100_000;
+            let cos = |i: i32| (f64::from(i) + 0.5) / f64::from(n);
+            let mean = (0..n)
+                .map(|i| 2.0 * cos(i) * (1.0 - f64::from(dielectric(cos(i) as f32, eta as f32).0)))
+                .sum::<f64>()
+                / f64::from(n);
+            let t = diffuse_through(eta);
+            assert!((t - mean).abs() < 1e-6, "{eta}: {t} {mean}");
+        }
+        for eta in [1e-6f64, 1e6] {
+            // 16 / (3 n) of the light passes where n is large: 4 cos / n and 4 / (n cos) of the two polarisations.
+            let few = 16.0 / 3.0 * eta.min(1.0 / eta) * (eta * eta).min(1.0);
+            assert!((diffuse_through(eta) / few - 1.0).abs() < 1e-3, "{eta}");
+        }
+        assert!(diffuse_through(1.0 + 1e-7) > 1.0 - 1e-6);
     }
 
     #[test]

@@ -122,6 +122,48 @@ impl Microfacet {
     }
 }
 
+/// The facet normal that reflects two directions into each other.
+pub(super) struct HalfVector {
+    pub m: Vec3,
+    /// D(m), > 0.
+    pub d: f32,
+    /// Cosine between `m` and either direction.
+    pub cos: f32,
+}
+
+/// Reflection at the facets.
+impl Microfacet {
+    /// `None` unless both directions are above the surface and some facets reflect one into the other.
+    #[inline]
+    pub(super) fn half_vector(&self, wo: Vec3, wi: Vec3) -> Option<HalfVector> {
+        if wo.z <= 0.0 || wi.z <= 0.0 {
+            return None;
+        }
+        let h = wo + wi;
+        let length = h.length();
+        let m = h / length;
+        let d = self.d(m);
+        // Half the sum of two unit vectors has the length of the cosine: the same from both ends, so that
+        // the value is reciprocal to the last digits also where both graze the surface.
+        (length > 0.0 && d > 0.0).then_some(HalfVector {
+            m,
+            d,
+            cos: (0.5 * length).min(1.0),
+        })
+    }
+
+    /// Density of the reflected direction: that of the facet normal over 4 cos (Walter et al. 2007,
+    /// equation 14). `masking` is G1(wo) / wo.z, `cos` the angle between facet normal and `wo`.
+    #[inline]
+    pub(super) fn reflected_pdf(&self, d: f32, masking: f32, m_z: f32, cos: f32) -> f32 {
+        if self.visible {
+            0.25 * d * masking
+        } else {
+            0.25 * d * m_z / cos
+        }
+    }
+}
+
 /// To the frame in which the roughness is 1. Directions and normals stretch alike here: normals scale by
 /// the inverse of the inverse.
 #[inline]

@@ -10,11 +10,19 @@ pub mod fresnel;
 pub mod iors;
 pub mod metals;
 pub mod microfacet;
+pub mod plastic;
+pub mod principled;
+pub mod rough_dielectric;
+pub mod rough_plastic;
 
 pub use conductor::{Conductor, RoughConductor};
 pub use dielectric::{Dielectric, Null, ThinDielectric};
 pub use diffuse::Diffuse;
 pub use microfacet::{Microfacet, Shape};
+pub use plastic::{Base, Plastic};
+pub use principled::{Principled, PrincipledThin};
+pub use rough_dielectric::RoughDielectric;
+pub use rough_plastic::{Coat, RoughPlastic};
 
 use crate::math::{Rgb, Vec2, Vec3};
 
@@ -71,10 +79,15 @@ pub enum Bsdf {
     RoughConductor(RoughConductor),
     Dielectric(Dielectric),
     ThinDielectric(ThinDielectric),
+    RoughDielectric(RoughDielectric),
+    Plastic(Plastic),
+    RoughPlastic(RoughPlastic),
+    Principled(Principled),
+    PrincipledThin(PrincipledThin),
     Null(Null),
 }
 
-const _: () = assert!(size_of::<Bsdf>() <= 64);
+const _: () = assert!(size_of::<Bsdf>() <= 76);
 
 impl Bsdf {
     /// f(wo, wi) in 1/sr, without cosine. Delta lobes contribute nothing.
@@ -83,12 +96,18 @@ impl Bsdf {
         self.eval_pdf(wo, wi, mode).0
     }
 
-    /// Density per steradian with which [`Bsdf::sample`] returns `wi`. Delta lobes contribute nothing.
+    /// Density per steradian with which [`Bsdf::sample`] returns `wi` for radiance. Delta lobes contribute
+    /// nothing.
     #[inline]
     pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
         match self {
             Bsdf::Diffuse(b) => b.eval_pdf(wo, wi).1,
             Bsdf::RoughConductor(b) => b.pdf(wo, wi),
+            Bsdf::RoughDielectric(b) => b.eval_pdf(wo, wi, Mode::Radiance).1,
+            Bsdf::Plastic(b) => b.eval_pdf(wo, wi).1,
+            Bsdf::RoughPlastic(b) => b.eval_pdf(wo, wi).1,
+            Bsdf::Principled(b) => b.eval_pdf(wo, wi, Mode::Radiance).1,
+            Bsdf::PrincipledThin(b) => b.eval_pdf(wo, wi, Mode::Radiance).1,
             Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Null(_) => {
                 0.0
             }
@@ -97,10 +116,15 @@ impl Bsdf {
 
     /// [`Bsdf::eval`] and [`Bsdf::pdf`] at once: multiple importance sampling needs both.
     #[inline]
-    pub fn eval_pdf(&self, wo: Vec3, wi: Vec3, _mode: Mode) -> (Rgb, f32) {
+    pub fn eval_pdf(&self, wo: Vec3, wi: Vec3, mode: Mode) -> (Rgb, f32) {
         match self {
             Bsdf::Diffuse(b) => b.eval_pdf(wo, wi),
             Bsdf::RoughConductor(b) => b.eval_pdf(wo, wi),
+            Bsdf::RoughDielectric(b) => b.eval_pdf(wo, wi, mode),
+            Bsdf::Plastic(b) => b.eval_pdf(wo, wi),
+            Bsdf::RoughPlastic(b) => b.eval_pdf(wo, wi),
+            Bsdf::Principled(b) => b.eval_pdf(wo, wi, mode),
+            Bsdf::PrincipledThin(b) => b.eval_pdf(wo, wi, mode),
             Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Null(_) => {
                 (Rgb::BLACK, 0.0)
             }
@@ -117,6 +141,11 @@ impl Bsdf {
             Bsdf::RoughConductor(b) => b.sample(wo, u),
             Bsdf::Dielectric(b) => b.sample(wo, u_lobe, mode),
             Bsdf::ThinDielectric(b) => b.sample(wo, u_lobe),
+            Bsdf::RoughDielectric(b) => b.sample(wo, u_lobe, u, mode),
+            Bsdf::Plastic(b) => b.sample(wo, u_lobe, u),
+            Bsdf::RoughPlastic(b) => b.sample(wo, u_lobe, u),
+            Bsdf::Principled(b) => b.sample(wo, u_lobe, u, mode),
+            Bsdf::PrincipledThin(b) => b.sample(wo, u_lobe, u, mode),
             Bsdf::Null(b) => b.sample(wo),
         }
     }
@@ -124,13 +153,25 @@ impl Bsdf {
     /// Only delta lobes: a connection to a light or a photon carries nothing.
     #[inline]
     pub fn is_delta(&self) -> bool {
-        !matches!(self, Bsdf::Diffuse(_) | Bsdf::RoughConductor(_))
+        matches!(
+            self,
+            Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) | Bsdf::Null(_)
+        )
     }
 
     /// Whether [`Bsdf::sample`] uses `u_lobe`.
     #[inline]
     pub fn has_lobes(&self) -> bool {
-        matches!(self, Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_))
+        matches!(
+            self,
+            Bsdf::Dielectric(_)
+                | Bsdf::ThinDielectric(_)
+                | Bsdf::RoughDielectric(_)
+                | Bsdf::Plastic(_)
+                | Bsdf::RoughPlastic(_)
+                | Bsdf::Principled(_)
+                | Bsdf::PrincipledThin(_)
+        )
     }
 
     /// Nothing but a diffuse lobe: irradiance is all there is to know of the light that arrives.
@@ -139,17 +180,19 @@ impl Bsdf {
         matches!(self, Bsdf::Diffuse(_))
     }
 
-    /// Reflectance of the diffuse lobe, 0 without one.
+    /// Reflectance of the diffuse lobe for light that arrives equally from all directions, 0 without one.
     #[inline]
     pub fn diffuse_albedo(&self) -> Rgb {
         match self {
             Bsdf::Diffuse(b) => b.albedo,
+            Bsdf::Plastic(b) => b.diffuse_albedo(),
+            Bsdf::RoughPlastic(b) => b.diffuse_albedo(),
             _ => Rgb::BLACK,
         }
     }
 
     /// Share of the light from `wo` that is scattered on, for the albedo layer (denoisers): exact for
-    /// smooth surfaces, for rough metals the Fresnel reflectance without masking.
+    /// smooth surfaces, for rough ones the Fresnel reflectance without masking.
     pub fn albedo(&self, wo: Vec3) -> Rgb {
         let metal = |b: &Conductor| match wo.z > 0.0 {
             true => b.fresnel(wo.z),
@@ -162,6 +205,11 @@ impl Bsdf {
             Bsdf::RoughConductor(b) => metal(&b.metal),
             Bsdf::Dielectric(b) => b.albedo(wo),
             Bsdf::ThinDielectric(b) => b.albedo(wo),
+            Bsdf::RoughDielectric(b) => b.albedo(wo),
+            Bsdf::Plastic(b) => b.albedo(wo),
+            Bsdf::RoughPlastic(b) => b.albedo(wo),
+            Bsdf::Principled(b) => b.albedo(wo),
+            Bsdf::PrincipledThin(b) => b.albedo(wo),
             Bsdf::Null(b) => b.transmittance,
         }
     }

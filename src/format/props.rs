@@ -423,13 +423,14 @@ fn rgb_of(value: &Value, role: Role) -> Option<Rgb> {
     }
 }
 
-/// The number that a value means where one number is wanted: a grey colour is one too.
+/// The number that a value means where one number is wanted: of a colour the mean, as in Mitsuba.
 pub(super) fn float_of(value: &Value) -> Option<f64> {
     use super::spectrum::Spectrum;
     match value {
         Value::Float(x) => Some(*x),
         Value::Int(i) => Some(*i as f64),
-        Value::Rgb([r, g, b]) => (r == g && g == b).then_some(*r),
+        Value::Rgb([r, g, b]) if r == g && g == b => Some(*r),
+        Value::Rgb([r, g, b]) => Some((r + g + b) / 3.0),
         Value::Spectrum(Spectrum::Uniform(x)) => Some(*x),
         _ => None,
     }

@@ -28,13 +28,14 @@ pub struct Disk {
     area: f64,
 }
 
-/// The open cylinder of radius 1 around the z axis from z = 0 to 1, under any map that keeps circles
-/// about its axis circles. `u` = angle / 2π, `v` = z.
+/// The open cylinder of radius 1 around the z axis from z = 0 to 1, under any affine map. `u` = angle / 2π,
+/// `v` = z.
 #[derive(Clone, Copy, Debug)]
 pub struct Cylinder {
     to_world: Transform,
     flip_normals: bool,
     area: f64,
+    even: bool,
 }
 
 /// An exact point of a surface and its derivatives, in world space.
@@ -316,19 +317,25 @@ impl Disk {
 }
 
 impl Cylinder {
-    /// `None` when the map squeezes circles about the axis into ellipses or shears the axis, so that
-    /// the area is not uniform in the parameters. Relative tolerance 1e-5.
-    pub fn new(to_world: Transform, flip_normals: bool) -> Option<Cylinder> {
+    pub fn new(to_world: Transform, flip_normals: bool) -> Cylinder {
         let m = to_world.matrix().matrix3;
         let (x, y, z) = (m.x_axis, m.y_axis, m.z_axis);
         let (rx, ry, h) = (x.length(), y.length(), z.length());
         let round = (rx - ry).abs() <= 1e-5 * rx && x.dot(y).abs() <= 1e-5 * rx * ry;
         let upright = x.dot(z).abs() <= 1e-5 * rx * h && y.dot(z).abs() <= 1e-5 * ry * h;
-        (round && upright).then(|| Cylinder {
+        Cylinder {
             to_world,
             flip_normals,
             area: TAU * (rx * ry).sqrt() * h,
-        })
+            even: round && upright,
+        }
+    }
+
+    /// False when the map squeezes circles about the axis into ellipses or shears the axis: then area is
+    /// not uniform in the parameters, and neither [`Cylinder::area`] nor samples of it are right. Relative
+    /// tolerance 1e-5.
+    pub fn is_even(&self) -> bool {
+        self.even
     }
 
     pub fn flip_normals(&self) -> bool {

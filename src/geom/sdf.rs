@@ -165,9 +165,12 @@ impl Sdf {
         let p = (o + d * t).as_vec3();
         let (ng, ns) = match &meeting {
             Some(m) => self.normals(m),
-            None => (-ray.d, -ray.d),
+            None => {
+                let back = -ray.d.normalize_or(Vec3::Z);
+                (back, back)
+            }
         };
-        let f64_error = ((o.length() + t) * 16.0 * f64::EPSILON) as f32;
+        let f64_error = ((o.length() + t * d.length()) * 16.0 * f64::EPSILON) as f32;
         Hit {
             p,
             p_err: p.abs() * fp::gamma(3) + Vec3::splat(f64_error),
@@ -263,7 +266,8 @@ impl Sdf {
 
     /// The normal as Mitsuba smooths it: the slope along each axis is taken in the two voxels on that axis
     /// whose centres enclose the point; the eight unit normals that their combinations give are weighed by
-    /// the distances from the centres. At the border the outermost voxel stands for the missing one.
+    /// the distances from the centres. At the border the outermost voxel stands for the missing one, on
+    /// all sides (in Mitsuba 3.9.1 on the lower ones; on the upper ones it takes a slope of zero).
     fn smooth_normal(&self, m: &Meeting) -> DVec3 {
         let last = self.grid.size.map(|n| n - 2);
         let pairs: [[(f64, f64); 2]; 3] = std::array::from_fn(|axis| {
@@ -296,20 +300,28 @@ impl Sdf {
 struct Walk {
     o: DVec3,
     d: DVec3,
-    extent: DVec3,
+    /// 1 / d
+    inverse: DVec3,
+    last: [usize; 3],
     /// Where the ray enters the voxel and where it leaves the grid or ends.
     t: f64,
     t_end: f64,
     voxel: [usize; 3],
+    /// Distances of the planes through which the ray would leave the voxel along each axis.
+    planes: [f64; 3],
 }
 
 impl Walk {
     /// `None` where the ray does not pass through the grid.
     fn new(o: DVec3, d: DVec3, t_max: f64, extent: DVec3) -> Option<Walk> {
+        let inverse = d.recip();
         let (mut t, mut t_end) = (0f64, t_max);
         for axis in 0..3 {
-            let (a, b) = (-o[axis] / d[axis], (extent[axis] - o[axis]) / d[axis]);
             if d[axis] != 0.0 {
+                let (a, b) = (
+                    -o[axis] * inverse[axis],
+                    (extent[axis] - o[axis]) * inverse[axis],
+                );
                 (t, t_end) = (t.max(a.min(b)), t_end.min(a.max(b)));
             } else if !(0.0..=extent[axis]).contains(&o[axis]) {
                 return None;
@@ -319,15 +331,20 @@ impl Walk {
         if !(t <= t_end && start.is_finite()) {
             return None;
         }
-        let voxel = |axis: usize| start[axis].clamp(0.0, extent[axis] - 1.0) as usize;
-        Some(Walk {
+        let last = extent.to_array().map(|n| n as usize - 1);
+        let voxel = |axis: usize| (start[axis].max(0.0) as usize).min(last[axis]);
+        let mut walk = Walk {
             o,
             d,
-            extent,
+            inverse,
+            last,
             t,
             t_end,
             voxel: std::array::from_fn(voxel),
-        })
+            planes: [f64::INFINITY; 3],
+        };
+        (0..3).for_each(|axis| walk.find_plane(axis));
+        Some(walk)
     }
 
     /// The corner of least coordinates.
@@ -335,41 +352,37 @@ impl Walk {
         DVec3::from(self.voxel.map(|i| i as f64))
     }
 
-    /// Distance of the plane through which the ray leaves the voxel along one axis.
-    fn plane(&self, axis: usize) -> f64 {
-        let ahead = self.voxel[axis] as f64 + f64::from(u8::from(self.d[axis] > 0.0));
-        match self.d[axis] {
-            0.0 => f64::INFINITY,
-            d => (ahead - self.o[axis]) / d,
+    fn find_plane(&mut self, axis: usize) {
+        if self.d[axis] != 0.0 {
+            let ahead = self.voxel[axis] + usize::from(self.d[axis] > 0.0);
+            self.planes[axis] = (ahead as f64 - self.o[axis]) * self.inverse[axis];
         }
     }
 
     /// Where the ray leaves the voxel.
     fn t_out(&self) -> f64 {
-        let nearest = (0..3)
-            .map(|axis| self.plane(axis))
-            .fold(self.t_end, f64::min);
-        nearest.max(self.t)
+        let [a, b, c] = self.planes;
+        a.min(b).min(c).min(self.t_end).max(self.t)
     }
 
     /// On to the next voxel; false at the end.
     fn step(&mut self, t_out: f64) -> bool {
-        let axis = (0..3).fold(0, |best, axis| {
-            if self.plane(axis) < self.plane(best) {
-                axis
-            } else {
-                best
-            }
-        });
+        let [a, b, c] = self.planes;
+        let axis = match (a <= b && a <= c, b <= c) {
+            (true, _) => 0,
+            (_, true) => 1,
+            _ => 2,
+        };
         let at = self.voxel[axis];
         let next = match self.d[axis] > 0.0 {
-            true => Some(at + 1).filter(|i| (*i as f64) < self.extent[axis]),
+            true => (at < self.last[axis]).then_some(at + 1),
             false => at.checked_sub(1),
         };
         let (Some(next), true) = (next, t_out < self.t_end) else {
             return false;
         };
         (self.voxel[axis], self.t) = (next, t_out);
+        self.find_plane(axis);
         true
     }
 }
@@ -421,7 +434,7 @@ impl Cubic {
     fn extrema(&self, end: f64) -> [Option<f64>; 2] {
         let Cubic([_, c1, c2, c3]) = self;
         let discriminant = c2 * c2 - 3.0 * c3 * c1;
-        if !(discriminant >= 0.0) {
+        if discriminant.is_nan() || discriminant < 0.0 {
             return [None, None];
         }
         // Without cancellation; either is infinite or NaN where there are fewer.

@@ -19,6 +19,8 @@ pub(super) fn decode(bytes: &[u8], kind: Kind) -> Result<Bitmap, String> {
     if !is_complete(bytes, kind) {
         return Err("the file is cut off".to_string());
     }
+    let renamed = radiance_mark(bytes, kind);
+    let bytes = renamed.as_deref().unwrap_or(bytes);
     guarded(|| {
         let mut reader = ImageReader::with_format(Cursor::new(bytes), format(kind)?);
         let mut limits = image::Limits::default();
@@ -54,6 +56,17 @@ pub(super) fn decode(bytes: &[u8], kind: Kind) -> Result<Bitmap, String> {
             pixels,
         })
     })
+}
+
+/// A Radiance file that begins with the mark of another program (Mitsuba writes `#?RGBE`), with the mark
+/// that the decoder knows.
+fn radiance_mark(bytes: &[u8], kind: Kind) -> Option<Vec<u8>> {
+    const MARK: &[u8] = b"#?RADIANCE";
+    if kind != Kind::Hdr || bytes.starts_with(MARK) {
+        return None;
+    }
+    let end = bytes.iter().position(|b| *b == b'\n')?;
+    Some([MARK, &bytes[end..]].concat())
 }
 
 /// Whether the end mark of the format is there. The JPEG decoder paints what is missing grey without
@@ -164,5 +177,21 @@ fn told(e: image::ImageError) -> String {
             "the file is cut off".to_string()
         }
         e => e.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn radiance_files_of_other_programs_are_read() {
+        let pixels = [Rgb::new(0.5, 1.0, 2.0), Rgb::new(0.25, 0.125, 4.0)];
+        let ours = encode_hdr(2, 1, &pixels).unwrap();
+        let rest = ours.strip_prefix(b"#?RADIANCE").unwrap();
+        let theirs = [b"#?RGBE", rest].concat();
+        assert_eq!(decode(&theirs, Kind::Hdr), decode(&ours, Kind::Hdr));
+        assert!(decode(&ours, Kind::Hdr).is_ok());
+        assert!(decode(b"#?RGBE", Kind::Hdr).is_err());
     }
 }

@@ -139,7 +139,7 @@ impl Spot {
             true => 1.0 - (c.sin() - b.sin()) / (c - b),
             false => 1.0 - c.cos(),
         };
-        let mean = self.texture.as_ref().map_or(1.0, |t| mean_luminance(t));
+        let mean = self.texture.as_ref().map_or(1.0, mean_luminance);
         (2.0 * std::f64::consts::PI * cone) as f32 * self.intensity.luminance() * mean
     }
 

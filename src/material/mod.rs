@@ -1,15 +1,19 @@
 //! Materials: from a hit, by way of textures, to the numbers of a [`Bsdf`].
 
+mod dielectrics;
+mod principled;
 mod relief;
 mod shading;
 
+pub use dielectrics::{Coated, Glass};
+pub use principled::{BaseTextures, PrincipledTextures, ThinTextures};
 pub use relief::{Map, Relief};
 pub use shading::Shading;
 
 use relief::Smooth;
 use shading::Bend;
 
-use crate::bsdf::{Bsdf, Conductor, Dielectric, Diffuse, Microfacet, Null, RoughConductor, Shape};
+use crate::bsdf::{Bsdf, Conductor, Diffuse, Microfacet, Null, RoughConductor, Shape};
 use crate::geom::Hit;
 use crate::math::fp::ONE_MINUS_EPSILON;
 use crate::math::{Frame, Rgb, Vec3};
@@ -30,11 +34,14 @@ pub enum Material {
         metal: Metal,
         roughness: Roughness,
     },
-    Dielectric {
-        eta: f32,
-        reflectance: Texture,
-        transmittance: Texture,
+    Dielectric(Glass),
+    ThinDielectric(Glass),
+    RoughDielectric {
+        glass: Glass,
+        roughness: Roughness,
     },
+    /// Plastic, smooth or rough.
+    Coated(Coated),
     /// `inside` where the texture (a share, 0 to 1) has the surface there; elsewhere light passes straight on.
     Mask {
         opacity: Texture,
@@ -50,6 +57,8 @@ pub enum Material {
         relief: Box<Relief>,
         inside: Box<Material>,
     },
+    Principled(Box<PrincipledTextures>),
+    PrincipledThin(Box<ThinTextures>),
     /// One-sided materials for the front and the back, each as if its side were the front.
     TwoSided {
         front: Box<Material>,
@@ -176,19 +185,27 @@ impl Material {
                 facets: roughness.at(at),
                 metal: metal.at(at),
             }),
-            Material::Dielectric {
-                eta,
-                reflectance,
-                transmittance,
-            } => Bsdf::Dielectric(Dielectric {
-                reflectance: reflectance.eval(at),
-                transmittance: transmittance.eval(at),
-                ..Dielectric::new(*eta)
-            }),
+            Material::Dielectric(glass) => Bsdf::Dielectric(glass.smooth(at)),
+            Material::ThinDielectric(glass) => glass.thin(at),
+            Material::RoughDielectric { glass, roughness } => glass.rough(roughness, at),
+            Material::Coated(coated) => coated.at(at),
+            Material::Principled(p) => p.at(at),
+            Material::PrincipledThin(p) => p.at(at),
             Material::TwoSided { front: inside, .. }
             | Material::Mask { inside, .. }
             | Material::Relief { inside, .. } => inside.bsdf(at),
             Material::Blend { parts, .. } => parts[0].bsdf(at),
+        }
+    }
+
+    /// Whether a principled material that light goes through is somewhere in the material.
+    pub fn is_clear(&self) -> bool {
+        match self {
+            Material::Principled(m) => m.base.is_clear(),
+            Material::TwoSided { front, back } => front.is_clear() || back.is_clear(),
+            Material::Mask { inside, .. } | Material::Relief { inside, .. } => inside.is_clear(),
+            Material::Blend { parts, .. } => parts.iter().any(Material::is_clear),
+            _ => false,
         }
     }
 
@@ -220,13 +237,20 @@ impl Material {
             | Material::UniformBothSides(Bsdf::RoughConductor(b)) => {
                 b.facets.alpha.x != b.facets.alpha.y
             }
-            Material::RoughConductor { roughness, .. } => roughness.anisotropic,
+            Material::Uniform(Bsdf::RoughDielectric(b)) => b.facets.alpha.x != b.facets.alpha.y,
+            Material::RoughConductor { roughness, .. }
+            | Material::RoughDielectric { roughness, .. } => roughness.anisotropic,
             Material::TwoSided { front, back } => {
                 front.follows_tangents() || back.follows_tangents()
             }
             Material::Mask { inside, .. } => inside.follows_tangents(),
             Material::Blend { parts, .. } => parts.iter().any(Material::follows_tangents),
             Material::Relief { .. } => true,
+            Material::Uniform(Bsdf::Principled(b))
+            | Material::UniformBothSides(Bsdf::Principled(b)) => b.base.is_anisotropic(),
+            Material::Uniform(Bsdf::PrincipledThin(b)) => b.base.is_anisotropic(),
+            Material::Principled(p) => p.base.is_anisotropic(),
+            Material::PrincipledThin(p) => p.base.is_anisotropic(),
             _ => false,
         }
     }
@@ -301,11 +325,14 @@ impl Material {
             } => {
                 vec![&m.eta, &m.k, &m.reflectance, &r.alpha_u, &r.alpha_v]
             }
-            Material::Dielectric {
-                reflectance,
-                transmittance,
-                ..
-            } => vec![reflectance, transmittance],
+            Material::Dielectric(glass) | Material::ThinDielectric(glass) => glass.textures(),
+            Material::RoughDielectric {
+                glass,
+                roughness: r,
+            } => [glass.textures(), vec![&r.alpha_u, &r.alpha_v]].concat(),
+            Material::Coated(coated) => coated.textures(),
+            Material::Principled(p) => p.textures(),
+            Material::PrincipledThin(p) => p.textures(),
         }
     }
 }

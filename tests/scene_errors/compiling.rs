@@ -114,11 +114,11 @@ a.xml:3:22: a part of the shape lies more than 1e15 from the origin, too far to 
     );
     says(
         building(
-            "<sensor type='perspective'/>\n<shape type='cylinder'><transform name='to_world'><scale x='2'/></transform></shape>",
+            "<sensor type='perspective'/>\n<shape type='cylinder'><transform name='to_world'><scale x='2'/></transform><emitter type='area'/></shape>",
         ),
         r#"
-a.xml:3:24: the transform makes the cylinder elliptic or oblique, which is not supported
-  <shape type='cylinder'><transform name='to_world'><scale x='2'/></transform></shape>
+a.xml:3:24: the transform makes the cylinder elliptic or oblique, which is not supported of an emitter
+  <shape type='cylinder'><transform name='to_world'><scale x='2'/></transform><emitter type='area'/></shape>
                          ^
   help: use a uniform scale, or a mesh of the shape"#,
     );
@@ -182,6 +182,92 @@ a.xml:3:50: "dielectric" already has two sides
   <shape type='sphere'><bsdf type='twosided'><bsdf type='dielectric'/></bsdf></shape>
                                                    ^
   help: use it without "twosided" around it"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<shape type='sphere'><bsdf type='twosided'><bsdf type='principledthin'/></bsdf></shape>",
+        ),
+        r#"
+a.xml:3:50: "principledthin" already has two sides
+  <shape type='sphere'><bsdf type='twosided'><bsdf type='principledthin'/></bsdf></shape>
+                                                   ^
+  help: use it without "twosided" around it"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<shape type='sphere'><bsdf type='twosided'><bsdf type='principled'><float name='spec_trans' value='0.1'/></bsdf></bsdf></shape>",
+        ),
+        r#"
+a.xml:3:93: what light goes through already has two sides
+  <shape type='sphere'><bsdf type='twosided'><bsdf type='principled'><float name='spec_trans' value='0.1'/></bsdf></bsdf></shape>
+                                                                                              ^
+  help: leave out spec_trans, or "twosided" around the material"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<shape type='sphere'><bsdf type='principled'><float name='eta' value='1.5'/><float name='specular' value='0.5'/></bsdf></shape>",
+        ),
+        r#"
+a.xml:3:84: bsdf "principled" takes either "eta" or "specular", not both; "eta" is at a.xml:3:53
+  <shape type='sphere'><bsdf type='principled'><float name='eta' value='1.5'/><float name='specular' value='0.5'/></bsdf></shape>
+                                                                                     ^"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<shape type='sphere'><bsdf type='principled'><float name='specular' value='12.5'/></bsdf></shape>",
+        ),
+        r#"
+a.xml:3:69: "specular" must be a number from 0 to 12, not 12.5
+  <shape type='sphere'><bsdf type='principled'><float name='specular' value='12.5'/></bsdf></shape>
+                                                                      ^"#,
+    );
+}
+
+#[test]
+fn glass_and_plastic() {
+    for plugin in ["thindielectric", "roughdielectric", "null"] {
+        let body = format!(
+            "<sensor type='perspective'/>\n<shape type='sphere'><bsdf type='twosided'><bsdf type='{plugin}'/></bsdf></shape>"
+        );
+        says(
+            building(&body),
+            &format!(
+                r#"
+a.xml:3:50: "{plugin}" already has two sides
+  <shape type='sphere'><bsdf type='twosided'><bsdf type='{plugin}'/></bsdf></shape>
+                                                   ^
+  help: use it without "twosided" around it"#
+            ),
+        );
+    }
+    says(
+        building(
+            "<sensor type='perspective'/>\n<shape type='sphere'><bsdf type='roughdielectric'><float name='alpha_v' value='0.1'/></bsdf></shape>",
+        ),
+        r#"
+a.xml:3:28: alpha_u and alpha_v come together
+  <shape type='sphere'><bsdf type='roughdielectric'><float name='alpha_v' value='0.1'/></bsdf></shape>
+                             ^
+  help: give both, or alpha alone"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<shape type='sphere'><bsdf type='roughplastic'><texture name='alpha' type='checkerboard'/></bsdf></shape>",
+        ),
+        r#"
+a.xml:3:57: "alpha" of bsdf "roughplastic" cannot be a texture
+  <shape type='sphere'><bsdf type='roughplastic'><texture name='alpha' type='checkerboard'/></bsdf></shape>
+                                                          ^"#,
+    );
+    says(
+        building(
+            "<sensor type='perspective'/>\n<shape type='sphere'><bsdf type='null'><rgb name='transmittance' value='1'/></bsdf></shape>",
+        ),
+        r#"
+a.xml:3:45: unknown parameter "transmittance" of bsdf "null"
+  <shape type='sphere'><bsdf type='null'><rgb name='transmittance' value='1'/></bsdf></shape>
+                                              ^
+  help: bsdf "null" has no parameters"#,
     );
 }
 

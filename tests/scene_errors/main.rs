@@ -5,6 +5,7 @@ mod compiling;
 mod emitters;
 mod files;
 mod language;
+mod meshes;
 mod outside;
 mod values;
 mod world;

@@ -72,11 +72,11 @@ a.xml:2:46: "reflectance" must be from 0 to 1 in each channel, not 1.5, 0, 0
                                                ^"#,
     );
     says(
-        inside("<bsdf type='roughconductor'><rgb name='alpha' value='0.1, 0.2, 0.3'/></bsdf>"),
+        inside("<bsdf type='roughconductor'><string name='alpha' value='rough'/></bsdf>"),
         r#"
-a.xml:2:47: "alpha" of bsdf "roughconductor" must be a number of at least 0, or a texture, not an rgb colour
-  <bsdf type='roughconductor'><rgb name='alpha' value='0.1, 0.2, 0.3'/></bsdf>
-                                                ^
+a.xml:2:50: "alpha" of bsdf "roughconductor" must be a number of at least 0, or a texture, not a string
+  <bsdf type='roughconductor'><string name='alpha' value='rough'/></bsdf>
+                                                   ^
   help: write <float name="alpha" .../>"#,
     );
     says(

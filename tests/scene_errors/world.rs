@@ -16,18 +16,18 @@ fn instances() {
     says(
         building("<shape type='instance'/>"),
         r#"
-a.xml:2:14: shape "instance" needs a <shape> inside
+a.xml:2:8: shape "instance" needs a <shape> inside
   <shape type='instance'/>
-               ^"#,
+         ^"#,
     );
     says(
         building(
             "<shape type='sphere' id='ball'/>\n<shape type='instance'><ref id='ball'/></shape>",
         ),
         r#"
-a.xml:3:14: an instance places a shapegroup, not a shape of type "sphere"
+a.xml:3:8: an instance places a shapegroup, not a shape of type "sphere"
   <shape type='instance'><ref id='ball'/></shape>
-               ^
+         ^
   help: put the shape into a <shape type="shapegroup"> and refer to that"#,
     );
     says(
@@ -35,16 +35,16 @@ a.xml:3:14: an instance places a shapegroup, not a shape of type "sphere"
             "<shape type='shapegroup' id='g'/>\n<shape type='instance'><ref id='g'/>\n<ref id='g'/></shape>",
         ),
         r#"
-a.xml:4:10: shape "instance" takes at most one shape; the first is at a.xml:3:33
+a.xml:4:6: shape "instance" takes at most one shape; the first is at a.xml:3:29
   <ref id='g'/></shape>
-           ^"#,
+       ^"#,
     );
     says(
         building(
             "<shape type='shapegroup' id='g'/>\n<shape type='instance'><ref id='g'/>\n<bsdf type='diffuse'/></shape>",
         ),
         r#"
-a.xml:4:13: a <bsdf> has no place in shape "instance"
+a.xml:4:1: a <bsdf> has no place in shape "instance"
   <bsdf type='diffuse'/></shape>
               ^"#,
     );
@@ -60,25 +60,25 @@ fn groups() {
     says(
         group("<shape type='sphere'>\n<emitter type='area'/></shape>"),
         r#"
-a.xml:4:16: a shape in a shapegroup cannot be an emitter
+a.xml:4:10: a shape in a shapegroup cannot be an emitter
   <emitter type='area'/></shape>
-                 ^
+           ^
   help: put the shape that shines beside the group, once for each place"#,
     );
     says(
         group("<shape type='shapegroup'/>"),
         r#"
-a.xml:3:14: the shape "shapegroup" cannot stand in a shapegroup
+a.xml:3:8: the shape "shapegroup" cannot stand in a shapegroup
   <shape type='shapegroup'/>
-               ^
+         ^
   help: list the shapes themselves in each group"#,
     );
     says(
         group("<shape type='instance'><shape type='shapegroup'/></shape>"),
         r#"
-a.xml:3:14: the shape "instance" cannot stand in a shapegroup
+a.xml:3:8: the shape "instance" cannot stand in a shapegroup
   <shape type='instance'><shape type='shapegroup'/></shape>
-               ^
+         ^
   help: list the shapes themselves in each group"#,
     );
     says(
@@ -86,9 +86,9 @@ a.xml:3:14: the shape "instance" cannot stand in a shapegroup
             "<shape type='sphere'><animation name='to_world'>\n<transform time='0'/><transform time='1'><translate x='1'/></transform></animation></shape>",
         ),
         r#"
-a.xml:3:39: a shape in a shapegroup cannot move by itself
+a.xml:3:22: a shape in a shapegroup cannot move by itself
   <shape type='sphere'><animation name='to_world'>
-                                        ^
+                       ^
   help: give the <animation> to the instances of the group"#,
     );
     says(
@@ -108,7 +108,7 @@ fn a_group_that_nothing_places_is_not_there() {
     let compiled = format::compile(&load(xml).unwrap(), &Overrides::default()).unwrap();
     assert_eq!(
         compiled.warnings[0],
-        "a.xml:2:14: no instance places this shapegroup, so it is not there"
+        "a.xml:2:8: no instance places this shapegroup, so it is not there"
     );
     assert_eq!(compiled.job.scene.counts().shapes, 0);
 }
@@ -137,7 +137,7 @@ fn meshes_that_deform() {
     };
     let expected = |end: &str, what: &str| {
         format!(
-            "a.xml:3:36: {what}\n  <string name='filename_end' value='{end}'/>\n{:>38}\n  help: a mesh \
+            "a.xml:3:29: {what}\n  <string name='filename_end' value='{end}'/>\n{:>31}\n  help: a mesh \
              deforms by moving its vertices: both files must list the same triangles",
             '^'
         )
@@ -148,9 +148,9 @@ fn meshes_that_deform() {
     says(
         error("moved.obj", "<emitter type='area'/>"),
         r#"
-a.xml:4:16: a mesh that changes its form cannot be an emitter
+a.xml:4:10: a mesh that changes its form cannot be an emitter
   <emitter type='area'/></shape><sensor type='perspective'><float name='shutter_close' value='1'/></sensor>
-                 ^
+           ^
   help: leave filename_end out, or move the shape as a whole by an <animation>"#,
     );
 }

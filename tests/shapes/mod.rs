@@ -48,7 +48,7 @@ pub fn sphere(t: Transform, flip: bool) -> Geometry {
 }
 
 pub fn cylinder(t: Transform, flip: bool) -> Geometry {
-    Geometry::Cylinder(Cylinder::new(t, flip).unwrap())
+    Geometry::Cylinder(Cylinder::new(t, flip))
 }
 
 pub fn disk(t: Transform, flip: bool) -> Geometry {

@@ -218,7 +218,7 @@ fn directional(p: &Props) -> Result<Emitter, SceneError> {
         None => p.transform("to_world")?.vector(DVec3::Z),
     };
     let d = along.try_normalize().ok_or_else(|| {
-        let what = "a direction of length 0 leads nowhere";
+        let what = "the direction has no length";
         p.error_at("direction", what)
     })?;
     Ok(Emitter::Directional {

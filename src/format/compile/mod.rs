@@ -72,10 +72,11 @@ pub fn compile(desc: &SceneDesc, overrides: &Overrides) -> Result<Compiled, Scen
     }
 
     let layout = Layout::new(&root, shutter, &mut warnings)?;
-    let (world, center, attributes) = layout.build(&mut plan)?;
+    let mut sources = layout.read()?;
+    let mut materials = Materials::new(desc, shapes::take_attributes(&mut sources));
+    let (world, center) = layout.place(sources, &mut plan)?;
     let measured = layout.measured(&sensor)?;
     let shape_props = layout.shapes;
-    let mut materials = Materials::new(desc, attributes);
     let mut surfaces = Vec::with_capacity(shape_props.len());
     for props in &shape_props {
         surfaces.push(materials.of_shape(props)?);

@@ -268,11 +268,13 @@ pub fn geometry(source: Source, center: DVec3) -> Result<Geometry, SceneError> {
         Kind::Sdf { grid, smooth } => Geometry::Sdf(Sdf::new(grid, to_scene, smooth)),
         Kind::Disk => Geometry::Disk(Disk::new(to_scene, flip_normals)),
         Kind::Cylinder => {
-            Geometry::Cylinder(Cylinder::new(to_scene, flip_normals).ok_or_else(|| {
-                refused(
-                    "the transform makes the cylinder elliptic or oblique, which is not supported",
-                )
-            })?)
+            let cylinder = Cylinder::new(to_scene, flip_normals);
+            if !cylinder.is_even() && props.child(Category::Emitter).is_some() {
+                return Err(refused(
+                    "the transform makes the cylinder elliptic or oblique, which is not supported of an emitter",
+                ));
+            }
+            Geometry::Cylinder(cylinder)
         }
     })
 }

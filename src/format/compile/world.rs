@@ -7,7 +7,6 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use super::attributes::Attributes;
 use super::camera::Sensor;
 use super::shapes::{self, Source};
 use super::{out_of_reach, within_reach};
@@ -191,14 +190,20 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// Reads the shapes, chooses the centre of the scene and of each group, and makes all relative to it.
-    /// With them, what meshes carry for textures.
-    pub fn build(&self, plan: &mut Plan) -> Result<(World, DVec3, Attributes), SceneError> {
+    /// Reads the shapes and their files.
+    pub fn read(&self) -> Result<Vec<Source<'a>>, SceneError> {
         let stands = self.shapes.par_iter().zip(&self.stands);
-        let mut sources: Vec<Source> = stands
+        stands
             .map(|(shape, (to_level, _))| shapes::read(shape, *to_level, self.time_passes))
-            .collect::<Result<_, SceneError>>()?;
-        let attributes = shapes::take_attributes(&mut sources);
+            .collect()
+    }
+
+    /// Chooses the centre of the scene and of each group, and makes what [`Layout::read`] gave relative to it.
+    pub fn place(
+        &self,
+        sources: Vec<Source>,
+        plan: &mut Plan,
+    ) -> Result<(World, DVec3), SceneError> {
         let mut top = Extent::EMPTY;
         let mut groups = vec![Extent::EMPTY; self.groups.len()];
         for (source, (_, group)) in sources.iter().zip(&self.stands) {
@@ -237,7 +242,7 @@ impl<'a> Layout<'a> {
             motion: motion.prepend(&to_scene),
         });
         let world = World::with_places(geometries, &self.groups, places.collect());
-        Ok((world, center, attributes))
+        Ok((world, center))
     }
 }
 

@@ -149,6 +149,6 @@ mod tests {
         let read = |wanted: &str| ply::parse(text.as_bytes(), &[wanted.to_string()]);
         assert!(read("vertex_color").is_ok());
         let what = "an attribute of face 1 is not finite".to_string();
-        assert_eq!(read("face_color"), Err((Some(29), what)));
+        assert_eq!(read("face_color"), Err((Some(28), what)));
     }
 }

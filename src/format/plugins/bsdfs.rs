@@ -59,6 +59,25 @@ const SAMPLE_VISIBLE: Param = Param::bool(
     true,
     "Sample the visible normals rather than all.",
 );
+const DIFFUSE_R: Param = Param::color(
+    "diffuse_reflectance",
+    Role::Reflectance,
+    0.5,
+    "Share of light that the base reflects.",
+);
+const NONLINEAR: Param = Param::bool(
+    "nonlinear",
+    false,
+    "Let the colour of the base deepen with each reflection below the surface.",
+);
+const INT_IOR_PLASTIC: Param =
+    Param::ior("int_ior", "polypropylene", "Index of refraction inside.");
+const ALPHA_EVERYWHERE: Param = Param::float(
+    "alpha",
+    Range::NonNegative,
+    0.1,
+    "Roughness, the same everywhere and in all directions.",
+);
 const TO_UV: Param = Param::transform(
     "to_uv",
     "Maps texture coordinates before look-up (x and y of the transform).",
@@ -197,6 +216,53 @@ pub const PLUGINS: &[Plugin] = &[
             "Replaces the shading normals of a material by those of a texture.",
         )
     },
+    bsdf(
+        "thindielectric",
+        &[INT_IOR, EXT_IOR, SPECULAR_R, SPECULAR_T],
+        "A pane of glass as one surface: light passes straight on, reflections inside are counted in.",
+    ),
+    Plugin {
+        exclusive: &[("alpha", "alpha_u"), ("alpha", "alpha_v")],
+        ..bsdf(
+            "roughdielectric",
+            &[
+                DISTRIBUTION,
+                ALPHA,
+                ALPHA_U,
+                ALPHA_V,
+                INT_IOR,
+                EXT_IOR,
+                SPECULAR_R,
+                SPECULAR_T,
+                SAMPLE_VISIBLE,
+            ],
+            "Rough boundary of glass and the like, with microfacets; the normal points outside.",
+        )
+    },
+    bsdf(
+        "plastic",
+        &[INT_IOR_PLASTIC, EXT_IOR, DIFFUSE_R, SPECULAR_R, NONLINEAR],
+        "Diffuse base under a smooth clear boundary, one-sided.",
+    ),
+    bsdf(
+        "roughplastic",
+        &[
+            DISTRIBUTION,
+            ALPHA_EVERYWHERE,
+            INT_IOR_PLASTIC,
+            EXT_IOR,
+            DIFFUSE_R,
+            SPECULAR_R,
+            NONLINEAR,
+            SAMPLE_VISIBLE,
+        ],
+        "Diffuse base under a rough clear boundary with microfacets, one-sided.",
+    ),
+    bsdf(
+        "null",
+        &[],
+        "A surface that is not there: light passes straight on.",
+    ),
     Plugin::new(
         Category::Texture,
         "bitmap",

@@ -8,6 +8,7 @@
 mod bsdfs;
 mod cameras;
 mod lights;
+mod principled;
 mod reference;
 mod sensors;
 mod shapes;
@@ -418,6 +419,7 @@ pub fn all() -> impl Iterator<Item = &'static Plugin> {
         sensors::PLUGINS,
         shapes::PLUGINS,
         bsdfs::PLUGINS,
+        principled::PLUGINS,
         lights::PLUGINS,
         spectra::PLUGINS,
     ]

@@ -9,7 +9,7 @@ const METHOD: &str = "use the integrator \"path\"";
 const DERIVATIVE: &str = "luxel computes no derivatives; use the integrator \"path\"";
 const RGB: &str = "luxel renders in RGB; write the colour with <rgb>";
 const BAKE: &str = "bake the texture into an image and use the texture \"bitmap\"";
-const NEAR_BSDF: &str = "use the nearest of diffuse, conductor, roughconductor and dielectric";
+const NEAR_BSDF: &str = "use the nearest of diffuse, plastic, roughplastic, conductor, roughconductor, dielectric and roughdielectric";
 
 const TABLE: &[(Category, &[&str], &str)] = &[
     (
@@ -30,12 +30,6 @@ const TABLE: &[(Category, &[&str], &str)] = &[
     (
         Bsdf,
         &[
-            "roughdielectric",
-            "thindielectric",
-            "plastic",
-            "roughplastic",
-            "principled",
-            "principledthin",
             "pplastic",
             "phong",
             "ward",
@@ -55,7 +49,6 @@ const TABLE: &[(Category, &[&str], &str)] = &[
         &["displacement"],
         "use \"bumpmap\", or put the relief into the mesh",
     ),
-    (Bsdf, &["null"], "cut the holes out of the mesh"),
     (
         Bsdf,
         &[

@@ -292,6 +292,7 @@ impl World {
         let geometries = self.geometries.iter().map(|g| match g {
             Geometry::Mesh(m) => m.bytes(),
             Geometry::Deforming(d) => d.bytes(),
+            Geometry::Sdf(s) => s.bytes(),
             _ => 0,
         });
         let levels = std::iter::once(&self.top).chain(&self.groups);

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::bsdf::{Bsdf, Diffuse, Shape, metals};
+use crate::bsdf::{Bsdf, Diffuse, Null, Shape, metals};
 use crate::format::plugins::Category;
 use crate::format::{ObjectId, Props, SceneDesc, SceneError};
 use crate::material::{Material, Metal, Roughness};
@@ -17,6 +17,8 @@ use super::suggest;
 
 mod attribute;
 mod composed;
+mod dielectrics;
+mod principled;
 mod textures;
 
 pub struct Materials<'a> {
@@ -120,57 +122,72 @@ impl<'a> Materials<'a> {
                 let [Some(first), last] = [sides.first(), sides.last()] else {
                     return Err(p.error("\"twosided\" needs a material inside"));
                 };
-                let front = Box::new(self.material(first)?);
+                let front = Box::new(self.one_sided(first)?);
                 let back = match last {
-                    Some(last) if sides.len() == 2 => Box::new(self.material(last)?),
+                    Some(last) if sides.len() == 2 => Box::new(self.one_sided(last)?),
                     _ => front.clone(),
                 };
                 Material::TwoSided { front, back }
             }
             "mask" | "blendbsdf" | "bumpmap" | "normalmap" => self.composed(p)?,
             "conductor" => Material::Conductor(self.metal(p)?),
-            "roughconductor" => {
-                let alpha = self.scalar(p, "alpha")?;
-                let mut along = |name: &str, other: &str| -> Result<Texture, SceneError> {
-                    match (p.is_given(name), p.is_given(other)) {
-                        (false, false) => Ok(alpha.clone()),
-                        (true, true) => self.scalar(p, name),
-                        _ => {
-                            let error = p.error("alpha_u and alpha_v come together");
-                            Err(error.with_help("give both, or alpha alone"))
-                        }
-                    }
-                };
-                let (alpha_u, alpha_v) =
-                    (along("alpha_u", "alpha_v")?, along("alpha_v", "alpha_u")?);
-                let shape = match p.choice("distribution")? {
-                    "ggx" => Shape::Ggx,
-                    _ => Shape::Beckmann,
-                };
-                let roughness = Roughness {
-                    shape,
-                    anisotropic: p.is_given("alpha_u"),
-                    alpha_u,
-                    alpha_v,
-                    visible: p.bool("sample_visible")?,
-                };
-                Material::RoughConductor {
-                    metal: self.metal(p)?,
-                    roughness,
-                }
-            }
-            "dielectric" => {
-                let (inside, outside) = (p.ior("int_ior")?, p.ior("ext_ior")?);
-                Material::Dielectric {
-                    eta: (inside / outside) as f32,
-                    reflectance: self.reflectance(p, "specular_reflectance")?,
-                    transmittance: self.reflectance(p, "specular_transmittance")?,
-                }
-            }
+            "roughconductor" => Material::RoughConductor {
+                roughness: self.roughness(p)?,
+                metal: self.metal(p)?,
+            },
+            "dielectric" => Material::Dielectric(self.glass(p)?),
+            "thindielectric" => Material::ThinDielectric(self.glass(p)?),
+            "roughdielectric" => Material::RoughDielectric {
+                roughness: self.roughness(p)?,
+                glass: self.glass(p)?,
+            },
+            "plastic" => self.plastic(p)?,
+            "roughplastic" => self.rough_plastic(p)?,
+            "null" => Material::Uniform(Bsdf::Null(Null {
+                transmittance: Rgb::WHITE,
+            })),
+            "principled" => self.principled(p)?,
+            "principledthin" => self.principled_thin(p)?,
             _ => Material::Diffuse {
                 reflectance: self.reflectance(p, "reflectance")?,
             },
         })
+    }
+
+    fn roughness(&mut self, p: &Props<'a>) -> Result<Roughness, SceneError> {
+        let alpha = self.scalar(p, "alpha")?;
+        let mut along = |name: &str, other: &str| -> Result<Texture, SceneError> {
+            match (p.is_given(name), p.is_given(other)) {
+                (false, false) => Ok(alpha.clone()),
+                (true, true) => self.scalar(p, name),
+                _ => {
+                    let error = p.error("alpha_u and alpha_v come together");
+                    Err(error.with_help("give both, or alpha alone"))
+                }
+            }
+        };
+        Ok(Roughness {
+            shape: roughness_shape(p)?,
+            alpha_u: along("alpha_u", "alpha_v")?,
+            alpha_v: along("alpha_v", "alpha_u")?,
+            anisotropic: p.is_given("alpha_u"),
+            visible: p.bool("sample_visible")?,
+        })
+    }
+
+    /// A material for one side of a surface: nothing goes through it.
+    fn one_sided(&mut self, p: &Props<'a>) -> Result<Material, SceneError> {
+        let material = self.material(p)?;
+        match material.is_clear() {
+            true => {
+                let error = p.error_at(
+                    "spec_trans",
+                    "what light goes through already has two sides",
+                );
+                Err(error.with_help("leave out spec_trans, or \"twosided\" around the material"))
+            }
+            false => Ok(material),
+        }
     }
 
     fn metal(&mut self, p: &Props<'a>) -> Result<Metal, SceneError> {
@@ -192,6 +209,13 @@ impl<'a> Materials<'a> {
             reflectance: self.reflectance(p, "specular_reflectance")?,
         })
     }
+}
+
+fn roughness_shape(p: &Props) -> Result<Shape, SceneError> {
+    Ok(match p.choice("distribution")? {
+        "ggx" => Shape::Ggx,
+        _ => Shape::Beckmann,
+    })
 }
 
 /// Reflectance of a shape without a material, as in Mitsuba, unless it emits light: then it is black.

@@ -49,7 +49,13 @@ impl<'a> Materials<'a> {
             FloatOrTexture::Texture(id) => {
                 let texture = self.texture(id)?;
                 self.check_scalar(id)?;
-                Ok(texture)
+                // What a picture of one colour was folded to is still a picture's.
+                Ok(match (texture, self.desc.object(id).plugin()) {
+                    (Texture::Constant(c), "bitmap") => {
+                        Texture::Constant(Rgb::splat(c.luminance()))
+                    }
+                    (texture, _) => texture,
+                })
             }
         }
     }
