@@ -72,7 +72,7 @@ fn main() {
         (
             "ball in place of the cube",
             boxed(
-                r#"<shape type="sphere"><point name="center" y="0.15"/><float name="radius" value="0.15"/>
+                r#"<shape type="sphere"><point name="center" x="0" y="0.15" z="0"/><float name="radius" value="0.15"/>
                 <ref id="white"/></shape>"#,
             ),
         ),

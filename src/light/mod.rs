@@ -5,8 +5,8 @@
 //! not know what blocks the way.
 
 mod beam;
+mod build;
 mod choice;
-mod collect;
 pub mod env;
 mod far;
 mod local;
@@ -25,14 +25,13 @@ pub use spot::{Spot, SpotSpec};
 pub(crate) use beam::has_feet;
 
 use crate::bsdf::Density;
-use crate::geom::{Endpoint, Geometry, Hit, Ray, ShapeId, World};
+use crate::geom::{Endpoint, Geometry, Hit, Ray, ShapeId};
 use crate::math::warp::{self, Tabulated2};
-use crate::math::{Aabb, Motion, Rgb, Vec2, Vec3};
+use crate::math::{Motion, Rgb, Vec2, Vec3};
 use crate::texture::{At, Texture};
 use choice::Choice;
 use far::Far;
-use local::Part;
-use moving::Moved;
+use local::{Part, Towards};
 
 /// What shines.
 #[derive(Clone, Debug)]
@@ -175,59 +174,6 @@ enum Radiance {
 const NO_ITEM: u32 = u32::MAX;
 
 impl Lights {
-    /// Emitters that are black or name a shape that is not there are left out.
-    pub fn new(emitters: Vec<Emitter>, geoms: &[Geometry]) -> Lights {
-        Lights::with_strategy(emitters, geoms, Strategy::Auto)
-    }
-
-    pub fn with_strategy(emitters: Vec<Emitter>, geoms: &[Geometry], strategy: Strategy) -> Lights {
-        Lights::build(emitters, geoms, Vec::new(), strategy)
-    }
-
-    /// The same for the shapes of `world`, where an emitter may be in a group that one placement moves.
-    /// What changes its form shines, but no connection is made to it.
-    pub fn in_world(emitters: Vec<Emitter>, world: &World, strategy: Strategy) -> Lights {
-        let shapes = (0..world.geometries().len() as u32).map(ShapeId);
-        let motions = match world.places() {
-            [] => Vec::new(),
-            _ => shapes
-                .map(|shape| world.placement_of(shape).map(|p| p.motion.clone()))
-                .collect(),
-        };
-        Lights::build(emitters, world.geometries(), motions, strategy)
-    }
-
-    fn build(
-        emitters: Vec<Emitter>,
-        geoms: &[Geometry],
-        motions: Vec<Option<Motion>>,
-        strategy: Strategy,
-    ) -> Lights {
-        let mut lights = Lights {
-            emitters: Vec::new(),
-            items: Vec::new(),
-            tables: Vec::new(),
-            choice: Choice::One,
-            far: Far::default(),
-            surfaces: vec![None; geoms.len()],
-            item_of: Vec::new(),
-            motions,
-        };
-        let mut bounds = Vec::new();
-        let mut far = Vec::new();
-        for (id, emitter) in emitters.iter().enumerate() {
-            lights.add(id as u32, emitter, geoms, &mut bounds, &mut far);
-        }
-        if !far.is_empty() {
-            let near = bounds.iter().map(|b| f64::from(b.power)).sum();
-            let near = (!bounds.is_empty()).then_some(near);
-            lights.far = Far::new(&emitters, far, near, radius(geoms));
-        }
-        lights.emitters = emitters;
-        lights.choice = Choice::new(strategy, &bounds);
-        lights
-    }
-
     pub fn emitters(&self) -> &[Emitter] {
         &self.emitters
     }
@@ -354,21 +300,19 @@ impl Lights {
         let item = self.items.get(index)?;
         let emitter = EmitterId(item.emitter);
         let prob = prob * share;
-        // A surface that moves is seen from its own coordinates.
-        let moved = self.moved(&item.what, from);
-        let eye = moved.as_ref().map_or(from.p, |m| m.into(from.p));
+        if let Some(moved) = self.moved(&item.what, from) {
+            return self.sample_moved(geoms, item, &moved, from.p, u, prob);
+        }
         let (towards, le) = match item.what {
             What::Part { part, radiance } => {
                 let g = geoms.get(part.shape().0 as usize)?;
-                (part.sample(g, eye, u)?, radiance)
+                (part.sample(g, from.p, u)?, radiance)
             }
             What::Textured { part, table } => {
                 let g = geoms.get(part.shape().0 as usize)?;
-                let (towards, at) = textured::sample(&part, g, self.table(table), eye, u)?;
+                let (towards, at) = textured::sample(&part, g, self.table(table), from.p, u)?;
                 (towards, self.textured(item.emitter, &at))
             }
-            // Beams do not move.
-            What::Beam { .. } if moved.is_some() => return None,
             What::Beam { part } => {
                 let g = geoms.get(part.shape().0 as usize)?;
                 let foot = beam::foot(&part, g, from)?;
@@ -377,33 +321,7 @@ impl Lights {
             }
             What::Point => return self.sample_point(item.emitter, from, prob),
         };
-        let towards = match &moved {
-            Some(moved) => moved.out(&towards, from.p)?,
-            None => towards,
-        };
-        let pdf = towards.pdf * prob;
-        (pdf > 0.0).then_some(EmitterSample {
-            wi: towards.wi,
-            dist: towards.dist,
-            end: Some(towards.end),
-            le,
-            density: Density::PerSr(pdf),
-            emitter,
-        })
-    }
-
-    /// How the surface of an item stands at the time of `from`, if it moves.
-    #[inline]
-    fn moved(&self, what: &What, from: &Hit) -> Option<Moved> {
-        if self.motions.is_empty() {
-            return None;
-        }
-        match what {
-            What::Part { part, .. } | What::Textured { part, .. } | What::Beam { part } => {
-                Some(Moved::new(self.motion(part.shape())?, from.time))
-            }
-            What::Point => None,
-        }
+        connection(towards, le, prob, emitter)
     }
 
     fn table(&self, index: Option<u32>) -> Option<&Tabulated2> {
@@ -461,25 +379,22 @@ impl Lights {
             return 0.0;
         };
         let what = &self.items[index as usize].what;
-        let moved = self.moved(what, from);
-        let (eye, p, ng) = match &moved {
-            Some(m) => (m.into(from.p), m.into(met.p), m.normal_into(met.ng)),
-            None => (from.p, met.p, met.ng),
-        };
-        let pdf = match *what {
-            What::Part { part, .. } => part.pdf(g, eye, p, ng),
-            What::Textured { part, table } => {
-                let at = place_of(met);
-                textured::pdf(&part, g, self.table(table), eye, (p, ng, &at))
-            }
-            What::Beam { .. } | What::Point => return 0.0,
-        };
-        let pdf = match &moved {
-            Some(moved) => moved.pdf_out(pdf, p - eye),
-            None => pdf,
+        let pdf = match self.moved(what, from) {
+            Some(moved) => self.pdf_moved(g, what, &moved, from.p, met),
+            None => self.pdf_of(g, what, from.p, (met.p, met.ng, &place_of(met))),
         };
         let prob = self.choice.prob(from, index as usize);
         prob * self.far.near_share() * pdf
+    }
+
+    /// Density per steradian at `eye` of the point `met` of an item: where it is, its normal and place.
+    #[inline]
+    fn pdf_of(&self, g: &Geometry, what: &What, eye: Vec3, met: (Vec3, Vec3, &At)) -> f32 {
+        match *what {
+            What::Part { part, .. } => part.pdf(g, eye, met.0, met.1),
+            What::Textured { part, table } => textured::pdf(&part, g, self.table(table), eye, met),
+            What::Beam { .. } | What::Point => 0.0,
+        }
     }
 
     /// Density per steradian at `from` with which [`Lights::sample`] returns the direction `d` to
@@ -493,6 +408,20 @@ impl Lights {
         })
         .sum()
     }
+}
+
+/// A connection to a point of a surface, chosen with probability `prob`.
+#[inline]
+fn connection(towards: Towards, le: Rgb, prob: f32, emitter: EmitterId) -> Option<EmitterSample> {
+    let pdf = towards.pdf * prob;
+    (pdf > 0.0).then_some(EmitterSample {
+        wi: towards.wi,
+        dist: towards.dist,
+        end: Some(towards.end),
+        le,
+        density: Density::PerSr(pdf),
+        emitter,
+    })
 }
 
 /// A connection that only its own direction can make; `le` is irradiance over its probability.
@@ -512,14 +441,5 @@ fn place_of(hit: &Hit) -> At {
         uv: hit.uv,
         prim: hit.prim,
         bary: hit.bary,
-    }
-}
-
-/// Of a sphere around all shapes.
-fn radius(geoms: &[Geometry]) -> f64 {
-    let all = geoms.iter().fold(Aabb::EMPTY, |b, g| b.union(g.bounds()));
-    match all.is_empty() {
-        true => 0.0,
-        false => 0.5 * all.diagonal().as_dvec3().length(),
     }
 }

@@ -2,9 +2,10 @@
 
 use super::local::Towards;
 use super::tree::LightBounds;
-use crate::geom::Endpoint;
+use super::{EmitterId, EmitterSample, Item, Lights, What, connection, place_of, textured};
 use crate::geom::world::{normal, point};
-use crate::math::{DVec3, Motion, Transform, Vec3};
+use crate::geom::{Endpoint, Geometry, Hit};
+use crate::math::{DVec3, Motion, Transform, Vec2, Vec3};
 
 /// A surface at one time.
 pub(super) struct Moved {
@@ -66,6 +67,66 @@ impl Moved {
     fn density(&self, w: DVec3) -> f64 {
         let m = self.to_world.matrix().matrix3;
         (m * w).length().powi(3) / m.determinant().abs()
+    }
+}
+
+impl Lights {
+    /// How the surface of an item stands at the time of `from`, if it moves.
+    #[inline]
+    pub(super) fn moved(&self, what: &What, from: &Hit) -> Option<Moved> {
+        if self.motions.is_empty() {
+            return None;
+        }
+        match what {
+            What::Part { part, .. } | What::Textured { part, .. } | What::Beam { part } => {
+                Some(Moved::new(self.motion(part.shape())?, from.time))
+            }
+            What::Point => None,
+        }
+    }
+
+    /// A connection from `eye` to an item that moves. Apart from the one for those that do not, so that
+    /// they pay nothing for it.
+    #[inline(never)]
+    pub(super) fn sample_moved(
+        &self,
+        geoms: &[Geometry],
+        item: &Item,
+        moved: &Moved,
+        eye: Vec3,
+        u: Vec2,
+        prob: f32,
+    ) -> Option<EmitterSample> {
+        let local = moved.into(eye);
+        let (towards, le) = match item.what {
+            What::Part { part, radiance } => {
+                let g = geoms.get(part.shape().0 as usize)?;
+                (part.sample(g, local, u)?, radiance)
+            }
+            What::Textured { part, table } => {
+                let g = geoms.get(part.shape().0 as usize)?;
+                let (towards, at) = textured::sample(&part, g, self.table(table), local, u)?;
+                (towards, self.textured(item.emitter, &at))
+            }
+            // Beams do not move.
+            What::Beam { .. } | What::Point => return None,
+        };
+        connection(moved.out(&towards, eye)?, le, prob, EmitterId(item.emitter))
+    }
+
+    /// Density per steradian at `eye` of the point `met` of an item that moves.
+    #[inline(never)]
+    pub(super) fn pdf_moved(
+        &self,
+        g: &Geometry,
+        what: &What,
+        moved: &Moved,
+        eye: Vec3,
+        met: &Hit,
+    ) -> f32 {
+        let (eye, p) = (moved.into(eye), moved.into(met.p));
+        let ng = moved.normal_into(met.ng);
+        moved.pdf_out(self.pdf_of(g, what, eye, (p, ng, &place_of(met))), p - eye)
     }
 }
 

@@ -86,7 +86,14 @@ impl Job {
             };
             let channels = (0..names.len()).map(channel);
             match layer.aov {
-                Aov::Alpha => image.layers[0].channels.extend(channels),
+                // Part of the colours, so stored as they are.
+                Aov::Alpha => image.layers[0].channels.extend(channels.map(|c| Channel {
+                    samples: match c.samples {
+                        Samples::Float(v) => store(v),
+                        other => other,
+                    },
+                    ..c
+                })),
                 _ => image.layers.push(Layer {
                     name: layer.name.clone(),
                     channels: channels.collect(),

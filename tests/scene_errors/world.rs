@@ -44,9 +44,9 @@ a.xml:4:6: shape "instance" takes at most one shape; the first is at a.xml:3:29
             "<shape type='shapegroup' id='g'/>\n<shape type='instance'><ref id='g'/>\n<bsdf type='diffuse'/></shape>",
         ),
         r#"
-a.xml:4:1: a <bsdf> has no place in shape "instance"
+a.xml:4:7: a <bsdf> has no place in shape "instance"
   <bsdf type='diffuse'/></shape>
-              ^"#,
+        ^"#,
     );
 }
 
@@ -94,9 +94,9 @@ a.xml:3:22: a shape in a shapegroup cannot move by itself
     says(
         building("<shape type='shapegroup'>\n<float name='radius' value='1'/></shape>"),
         r#"
-a.xml:3:14: unknown parameter "radius" of shape "shapegroup"
+a.xml:3:8: unknown parameter "radius" of shape "shapegroup"
   <float name='radius' value='1'/></shape>
-               ^
+         ^
   help: shape "shapegroup" has no parameters"#,
     );
 }

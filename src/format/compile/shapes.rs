@@ -26,7 +26,7 @@ enum Kind {
         data: MeshData,
         smooth: bool,
         /// The same mesh when the shutter closes.
-        end: Option<MeshData>,
+        end: Option<Box<MeshData>>,
     },
     Rectangle,
     Cube,
@@ -143,7 +143,7 @@ fn mesh(props: &Props, to_world: &Transform, time_passes: bool) -> Result<Kind, 
     // flat, since a zero normal leaves the face its own.
     let smooth = !props.bool("face_normals")? && data.normals.is_none();
     let end = match props.is_given("filename_end") && time_passes {
-        true => Some(mesh_file(props, "filename_end", to_world)?),
+        true => Some(Box::new(mesh_file(props, "filename_end", to_world)?)),
         false => None,
     };
     props.ignore(&["filename_end"]);
@@ -257,7 +257,7 @@ pub fn geometry(source: Source, center: DVec3) -> Result<Geometry, SceneError> {
             let open = build(data, "filename")?;
             match end {
                 None => Geometry::Mesh(open),
-                Some(end) => deforming(&props, open, build(end, "filename_end")?)?,
+                Some(end) => deforming(&props, open, build(*end, "filename_end")?)?,
             }
         }
         Kind::Rectangle => Geometry::Mesh(Mesh::rectangle(&to_scene, flip_normals)),

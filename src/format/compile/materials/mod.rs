@@ -60,7 +60,7 @@ impl<'a> Materials<'a> {
         let varying = self
             .materials
             .iter()
-            .filter(|m| !matches!(m, Material::Uniform(_)))
+            .filter(|m| !matches!(m, Material::Uniform(_) | Material::UniformBothSides(_)))
             .count();
         if varying == 0 {
             plan.add(

@@ -1,15 +1,70 @@
-//! What there is to choose among: the parts of shining surfaces, points, and lights at infinity.
+//! From a list of emitters to the lights of a scene.
 
+use super::choice::{Choice, Strategy};
+use super::far::Far;
 use super::local::{self, Part};
 use super::tree::LightBounds;
-use super::{Emitter, Item, Lights, NO_ITEM, Radiance, Surface, What, moving, textured};
-use crate::geom::{Geometry, ShapeId};
+use super::{Emitter, Item, Lights, NO_ITEM, Radiance, Surface, What};
+use super::{moving, textured};
+use crate::geom::{Geometry, ShapeId, World};
 use crate::math::{Aabb, Motion, PI, Rgb, Vec3};
 
 impl Lights {
-    /// Adds an emitter: `bounds` gets what the choice is to know of each of its items, `far` its number
-    /// if it is at infinity.
-    pub(super) fn add(
+    /// Emitters that are black or name a shape that is not there are left out.
+    pub fn new(emitters: Vec<Emitter>, geoms: &[Geometry]) -> Lights {
+        Lights::with_strategy(emitters, geoms, Strategy::Auto)
+    }
+
+    pub fn with_strategy(emitters: Vec<Emitter>, geoms: &[Geometry], strategy: Strategy) -> Lights {
+        Lights::build(emitters, geoms, Vec::new(), around(&all(geoms)), strategy)
+    }
+
+    /// The same for the shapes of `world`, where an emitter may be in a group that one placement moves.
+    /// What changes its form shines, but no connection is made to it.
+    pub fn in_world(emitters: Vec<Emitter>, world: &World, strategy: Strategy) -> Lights {
+        let shapes = (0..world.geometries().len() as u32).map(ShapeId);
+        let geoms = world.geometries();
+        if world.places().is_empty() {
+            return Lights::with_strategy(emitters, geoms, strategy);
+        }
+        let motion = |shape| world.placement_of(shape).map(|p| p.motion.clone());
+        let motions = shapes.map(motion).collect();
+        Lights::build(emitters, geoms, motions, around(&world.bounds()), strategy)
+    }
+
+    fn build(
+        emitters: Vec<Emitter>,
+        geoms: &[Geometry],
+        motions: Vec<Option<Motion>>,
+        radius: f64,
+        strategy: Strategy,
+    ) -> Lights {
+        let mut lights = Lights {
+            emitters: Vec::new(),
+            items: Vec::new(),
+            tables: Vec::new(),
+            choice: Choice::One,
+            far: Far::default(),
+            surfaces: vec![None; geoms.len()],
+            item_of: Vec::new(),
+            motions,
+        };
+        let mut bounds = Vec::new();
+        let mut far = Vec::new();
+        for (id, emitter) in emitters.iter().enumerate() {
+            lights.add(id as u32, emitter, geoms, &mut bounds, &mut far);
+        }
+        if !far.is_empty() {
+            let near = bounds.iter().map(|b| f64::from(b.power)).sum();
+            let near = (!bounds.is_empty()).then_some(near);
+            lights.far = Far::new(&emitters, far, near, radius);
+        }
+        lights.emitters = emitters;
+        lights.choice = Choice::new(strategy, &bounds);
+        lights
+    }
+
+    fn add(
         &mut self,
         id: u32,
         emitter: &Emitter,
@@ -47,8 +102,7 @@ impl Lights {
                 if radiance.is_black() {
                     return;
                 }
-                self.add_surface(*shape, Radiance::Constant(*radiance));
-                self.add_unreachable(g);
+                self.add_surface(*shape, g, Radiance::Constant(*radiance));
                 for part in local::parts_of(*shape, g) {
                     let what = What::Part {
                         part,
@@ -62,8 +116,7 @@ impl Lights {
                 let Some(g) = geoms.get(shape.0 as usize) else {
                     return;
                 };
-                self.add_surface(*shape, Radiance::Textured(id));
-                self.add_unreachable(g);
+                self.add_surface(*shape, g, Radiance::Textured(id));
                 for spread in textured::spread(*shape, g, radiance) {
                     let table = spread.table.map(|table| {
                         self.tables.push(table);
@@ -79,8 +132,7 @@ impl Lights {
                     return;
                 };
                 // It belongs to an emitter, but no ray sees its light.
-                self.add_surface(*shape, Radiance::Constant(Rgb::BLACK));
-                self.add_unreachable(g);
+                self.add_surface(*shape, g, Radiance::Constant(Rgb::BLACK));
                 for spread in textured::spread(*shape, g, exitance) {
                     let part = spread.part;
                     self.add_part(id, g, part, What::Beam { part }, spread.mean, bounds);
@@ -98,13 +150,10 @@ impl Lights {
         }
     }
 
-    fn add_surface(&mut self, shape: ShapeId, radiance: Radiance) {
+    fn add_surface(&mut self, shape: ShapeId, g: &Geometry, radiance: Radiance) {
         let first = self.item_of.len() as u32;
         self.surfaces[shape.0 as usize] = Some(Surface { radiance, first });
-    }
-
-    /// What changes its form is met, but not aimed at: its primitives have no items.
-    fn add_unreachable(&mut self, g: &Geometry) {
+        // What changes its form is met, but not aimed at: its primitives have no items.
         if let Geometry::Deforming(_) = g {
             let none = std::iter::repeat_n(NO_ITEM, g.prim_count() as usize);
             self.item_of.extend(none);
@@ -149,5 +198,17 @@ impl Lights {
                 None => local,
             });
         }
+    }
+}
+
+fn all(geoms: &[Geometry]) -> Aabb {
+    geoms.iter().fold(Aabb::EMPTY, |b, g| b.union(g.bounds()))
+}
+
+/// Radius of a sphere around the scene.
+fn around(bounds: &Aabb) -> f64 {
+    match bounds.is_empty() {
+        true => 0.0,
+        false => 0.5 * bounds.diagonal().as_dvec3().length(),
     }
 }
