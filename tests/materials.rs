@@ -366,3 +366,26 @@ fn mixtures_follow_their_weight() {
     );
     assert_explained(mean_and_error(&xml, 256, 3), 0.7 * 0.8 + 0.3 * 0.2, "blend");
 }
+
+/// Hidden emitters stay hidden behind masks and panes, which the camera looks straight through.
+#[test]
+fn hidden_emitters_are_hidden_behind_what_is_not_there() {
+    for bsdf in [
+        r#"<bsdf type="mask"><float name="opacity" value="0.5"/><bsdf type="diffuse">
+            <rgb name="reflectance" value="0"/></bsdf></bsdf>"#,
+        r#"<bsdf type="thindielectric"><float name="int_ior" value="1"/><float name="ext_ior" value="1"/></bsdf>"#,
+        r#"<bsdf type="null"/>"#,
+    ] {
+        let xml = format!(
+            r#"<scene version="3.0.0">
+                <integrator type="path"><boolean name="hide_emitters" value="true"/></integrator>{}
+                <emitter type="constant"><rgb name="radiance" value="1"/></emitter>
+                <shape type="sphere">{bsdf}</shape>
+                <shape type="rectangle"><transform name="to_world"><translate z="-2"/></transform>
+                    <emitter type="area"/></shape>
+            </scene>"#,
+            camera(6, 10.0)
+        );
+        assert!(picture(&xml, 16, 1).iter().all(|p| p[0] == 0.0), "{bsdf}");
+    }
+}

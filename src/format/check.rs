@@ -108,7 +108,10 @@ pub fn children(
             .filter(|c| objects[c.object.index()].plugin.category == slot.category)
             .count();
         if count < slot.min {
-            let what = format!("{plugin} needs a <{}> inside", slot.category);
+            let what = match slot.min {
+                1 => format!("{plugin} needs a <{}> inside", slot.category),
+                n => format!("{plugin} needs {n} of <{}> inside", slot.category),
+            };
             return Err(SceneError::new(place(object.at), what));
         }
     }

@@ -102,23 +102,26 @@ impl PathSpec {
         let max_depth = self.max_depth.unwrap_or(UNBOUNDED);
         let (mut lo, mut throughput) = (Rgb::BLACK, Rgb::WHITE);
         let mut seen = false;
+        // Whether the walk is still the camera's straight look: through masks and panes, but not scattered.
+        // Hidden emitters are hidden from that look alone.
+        let mut straight = true;
         // Product of the squared relative indices of refraction: takes the compression of radiance in a
         // dense medium out of the roulette's decision.
         let mut eta2 = 1.0;
         let mut last: Option<(Hit, Density)> = None;
         for depth in 0..max_depth {
-            let met = match depth {
-                0 => first_seen(scene, ray, self.hide_emitters, stats),
-                _ => scene.intersect(&ray),
+            let met = match straight {
+                true => first_seen(scene, ray, self.hide_emitters, stats),
+                false => scene.intersect(&ray),
             };
             let departure = last.as_ref().map(|(from, density)| Departure {
                 from,
                 density: *density,
                 light_per_bsdf: 1.0,
             });
-            if depth > 0 || !self.hide_emitters {
+            if !(straight && self.hide_emitters) {
                 let le = emission(scene, &ray, met.as_ref(), departure);
-                seen |= last.is_none() && !le.is_black();
+                seen |= straight && !le.is_black();
                 lo += throughput * le;
             }
             let Some(hit) = met else {
@@ -142,7 +145,11 @@ impl PathSpec {
                 stats.indirect += 1;
                 continue;
             }
-            seen = true;
+            let pane = matches!(shading.bsdf, Bsdf::ThinDielectric(_));
+            if !pane {
+                straight = false;
+                seen = true;
+            }
             let any_choice = roulette || scene.lights_are_chosen() || shading.bsdf.has_lobes();
             let u = numbers.draw(any_choice);
             if !shading.bsdf.is_delta() && scene.has_lights() {
@@ -162,6 +169,11 @@ impl PathSpec {
             let Some(sample) = shading.sample(u.lobe, u.direction, Mode::Radiance) else {
                 break;
             };
+            // A pane reflects or lets pass.
+            if pane && sample.wi.dot(hit.ng) * hit.wo.dot(hit.ng) > 0.0 {
+                straight = false;
+                seen = true;
+            }
             throughput *= sample.weight;
             eta2 *= sample.eta * sample.eta;
             if roulette {

@@ -2,6 +2,7 @@
 
 mod cameras;
 mod compiling;
+mod composed;
 mod emitters;
 mod files;
 mod language;

@@ -248,7 +248,6 @@ fn thin_lens(sensor: &Props, far_clip: f64) -> Result<Lens, SceneError> {
 /// The field of view in degrees and what it is measured along.
 pub(super) fn field_of_view(p: &Props) -> Result<(f64, FovAxis), SceneError> {
     let Some(fov) = p.opt_float("fov")? else {
-        p.ignore(&["fov_axis"]);
         return Ok((fov_of_focal_length(p)?, FovAxis::Diagonal));
     };
     let axis = match p.choice("fov_axis")? {

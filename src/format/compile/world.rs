@@ -77,6 +77,17 @@ impl<'a> Layout<'a> {
                 let no_time = "filename_end has no effect, as the shutter closes when it opens; give the sensor a shutter_close";
                 warnings.push(at(shape, no_time));
             }
+            let placed = layout.places.iter().map(|(props, ..)| props);
+            for shape in layout.shapes.iter().chain(placed) {
+                if shape
+                    .keyframes("to_world")?
+                    .windows(2)
+                    .any(|k| k[0] != k[1])
+                {
+                    let no_time = "the animation has no effect, as the shutter closes when it opens; give the sensor a shutter_close";
+                    warnings.push(at(shape, no_time));
+                }
+            }
         }
         Ok(layout)
     }
