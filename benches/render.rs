@@ -76,6 +76,28 @@ fn main() {
                 <ref id="white"/></shape>"#,
             ),
         ),
+        (
+            "masked cube",
+            cube(
+                r#"<bsdf type="mask"><float name="opacity" value="0.5"/><ref id="white"/></bsdf>"#,
+            ),
+        ),
+        (
+            "cube with a normal map",
+            cube(
+                r#"<bsdf type="normalmap"><texture type="checkerboard" name="normalmap">
+                <rgb name="color0" value="0.5, 0.5, 1"/><rgb name="color1" value="0.6, 0.5, 0.9"/></texture>
+                <ref id="white"/></bsdf>"#,
+            ),
+        ),
+        (
+            "through a lens",
+            plain.replace(
+                r#"sensor type="perspective">"#,
+                r#"sensor type="thinlens"><float name="aperture_radius" value="0.01"/>
+                <float name="focus_distance" value="3"/>"#,
+            ),
+        ),
         ("instance in place of the cube", instance),
         ("cube that turns", moving(r#"<rotate y="1" angle="40"/>"#)),
         ("cube that flies", moving(r#"<translate x="0.5" y="0.4"/>"#)),
