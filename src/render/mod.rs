@@ -160,8 +160,9 @@ impl Job {
                         time,
                     });
                     let ray = seen.ray;
-                    let li = self.integrator.li(&self.scene, ray, &sampler, &mut rays);
-                    let radiance = li.radiance * seen.weight;
+                    let mut li = self.integrator.li(&self.scene, ray, &sampler, &mut rays);
+                    li.radiance *= seen.weight;
+                    let radiance = li.radiance;
                     // A NaN fails the comparison too.
                     if radiance.is_finite() && radiance.min_component() >= 0.0 {
                         tile.add(x, y, s, radiance * weight);
