@@ -3,9 +3,11 @@
 
 mod estimate;
 mod filter;
+mod splat;
 
 pub use estimate::{ErrorEstimate, student_t_95};
 pub use filter::{Filter, FilterSampler};
+pub use splat::{Splat, SplatBuffer};
 
 use crate::math::Rgb;
 
@@ -167,6 +169,23 @@ impl Film {
     /// The tiles, to be given samples `spp()..spp() + n` each; then call [`Film::finish_pass`].
     pub fn tiles_mut(&mut self) -> &mut [Tile] {
         &mut self.tiles
+    }
+
+    /// Adds `values`, row by row, to the sample that is under way (number `spp()`) of every pixel.
+    pub fn add_everywhere(&mut self, values: &[[f64; 3]]) {
+        let replicate = (self.spp & u64::from(self.replicates - 1)) as usize;
+        let width = self.window.width as usize;
+        for tile in &mut self.tiles {
+            for y in 0..tile.height {
+                for x in 0..tile.width {
+                    let from = (tile.y + y) as usize * width + (tile.x + x) as usize;
+                    let sum = &mut tile.pixel(x, y).rgb[replicate];
+                    for (s, v) in sum.iter_mut().zip(values[from]) {
+                        *s += v;
+                    }
+                }
+            }
+        }
     }
 
     /// Says that every pixel has received `n` more samples.

@@ -16,6 +16,9 @@ pub mod dim {
     pub const CAMERA: u32 = 0;
     /// Time within the shutter (1 number), drawn only when something moves.
     pub const TIME: u32 = 1;
+    /// The start of a walk from a light: choice of the light and of the target (2 numbers), and point on the
+    /// lens that it is connected to (2); place and direction (2 each) in the block after it.
+    pub const EMISSION: u32 = 2;
     /// First block of the path's vertices; each owns [`PER_VERTEX`] blocks.
     pub const VERTEX: u32 = 8;
     pub const PER_VERTEX: u32 = 8;

@@ -18,9 +18,13 @@ const ROWS: [&[&str]; 9] = [
 
 /// Crates that only the named rooms may use. Threads (rayon) are for what loops over pixels, shapes or
 /// triangles, not for what happens at one hit.
-const CRATES: [(&str, &[&str]); 12] = [
+const CRATES: [(&str, &[&str]); 13] = [
     ("obvhs", &["geom"]),
-    ("rayon", &["geom", "render", "study", "format", "cli"]),
+    (
+        "rayon",
+        &["geom", "transport", "render", "study", "format", "cli"],
+    ),
+    ("kiddo", &["transport"]),
     ("serde_json", &["render", "cli"]),
     ("sobol_burley", &["sampler"]),
     ("rand_pcg", &["sampler"]),

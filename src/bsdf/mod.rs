@@ -159,6 +159,21 @@ impl Bsdf {
         )
     }
 
+    /// Whether some lobe is a delta one that reflects or refracts. What lets light pass straight on as if it
+    /// were not there has none.
+    #[inline]
+    pub fn has_delta(&self) -> bool {
+        match self {
+            Bsdf::Conductor(_)
+            | Bsdf::Dielectric(_)
+            | Bsdf::ThinDielectric(_)
+            | Bsdf::Plastic(_) => true,
+            // Between equal indices all facets send light straight on.
+            Bsdf::RoughDielectric(b) => b.surface.eta == 1.0,
+            _ => false,
+        }
+    }
+
     /// Whether [`Bsdf::sample`] uses `u_lobe`.
     #[inline]
     pub fn has_lobes(&self) -> bool {

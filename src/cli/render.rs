@@ -332,7 +332,7 @@ fn statistics(
             "camera": stats.rays.camera,
             "shadow": stats.rays.shadow,
             "indirect": stats.rays.indirect,
-            "photon": 0,
+            "photon": stats.rays.photon,
         },
         "rays_per_second": stats.rays_per_second(),
         "peak_memory_bytes": peak_memory(),

@@ -7,6 +7,7 @@
 mod beam;
 mod build;
 mod choice;
+mod emission;
 pub mod env;
 mod far;
 mod local;
@@ -18,6 +19,7 @@ mod textured;
 mod tree;
 
 pub use choice::{Strategy, TREE_FROM};
+pub use emission::{Aim, Emission, EmissionNumbers, EmissionPdf, Source, Target};
 pub use env::{EnvError, EnvMap};
 pub use projector::{Projector, ProjectorSpec};
 pub use spot::{Spot, SpotSpec};

@@ -175,6 +175,30 @@ impl Material {
         }
     }
 
+    /// Whether some part of the material has a lobe that is not a delta one.
+    pub fn receives(&self) -> bool {
+        match self {
+            Material::Uniform(bsdf) | Material::UniformBothSides(bsdf) => !bsdf.is_delta(),
+            Material::Conductor(_) | Material::Dielectric(_) | Material::ThinDielectric(_) => false,
+            Material::TwoSided { front, back } => front.receives() || back.receives(),
+            Material::Mask { inside, .. } | Material::Relief { inside, .. } => inside.receives(),
+            Material::Blend { parts, .. } => parts.iter().any(Material::receives),
+            _ => true,
+        }
+    }
+
+    /// Whether some part of the material has a delta lobe that reflects or refracts: it can throw a caustic.
+    pub fn is_specular(&self) -> bool {
+        match self {
+            Material::Uniform(bsdf) | Material::UniformBothSides(bsdf) => bsdf.has_delta(),
+            Material::Conductor(_) | Material::Dielectric(_) | Material::ThinDielectric(_) => true,
+            Material::TwoSided { front, back } => front.is_specular() || back.is_specular(),
+            Material::Mask { inside, .. } | Material::Relief { inside, .. } => inside.is_specular(),
+            Material::Blend { parts, .. } => parts.iter().any(Material::is_specular),
+            plain => plain.bsdf(&At::default()).has_delta(),
+        }
+    }
+
     /// The numbers of a material without structure of its own.
     fn bsdf(&self, at: &At) -> Bsdf {
         match self {

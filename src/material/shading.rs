@@ -54,6 +54,32 @@ impl Shading {
         (f * (local.z.abs() * shadowing), pdf)
     }
 
+    /// Whether a relief bends the frame, which may depend on the side it is seen from.
+    #[inline]
+    pub fn is_bent(&self) -> bool {
+        self.bend.is_some()
+    }
+
+    /// The same surface seen from `wo`, for a frame that does not depend on that.
+    #[inline]
+    pub fn turned_to(&self, wo: Vec3) -> Shading {
+        Shading {
+            wo: self.frame.to_local(wo),
+            ..*self
+        }
+    }
+
+    /// What the weight of a sample in [`Mode::Importance`] is multiplied with to be that of light which goes
+    /// on along `wi`: where shading and geometric normals differ, light crosses the surface by the one and is
+    /// scattered by the other (Veach 1997, section 5.3.2).
+    #[inline]
+    pub fn adjoint(&self, hit: &Hit, wi: Vec3) -> f32 {
+        let shading = self.wo.z * hit.ng.dot(wi);
+        let geometric = hit.ng.dot(hit.wo) * self.frame.n.dot(wi);
+        let factor = (shading / geometric).abs();
+        if factor.is_finite() { factor } else { 0.0 }
+    }
+
     /// A direction in which light goes on; see [`Bsdf::sample`].
     #[inline]
     pub fn sample(&self, u_lobe: f32, u: Vec2, mode: Mode) -> Option<BsdfSample> {

@@ -4,17 +4,17 @@ mod picture;
 
 pub use picture::{ComponentFormat, Metadata, PixelFormat};
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
-use crate::film::{self, ErrorEstimate, Film, FilmSpec, FilterSampler, Tile};
+use crate::film::{self, ErrorEstimate, Film, FilmSpec, FilterSampler, SplatBuffer, Tile};
 use crate::math::{Rgb, Vec2};
 use crate::sampler::{Sampler, SamplerKind, dim};
 use crate::scene::{Camera, CameraSample, Scene};
 use crate::transport::aov::{self, Aov};
-use crate::transport::{IntegratorSpec, PathStats};
+use crate::transport::{IntegratorSpec, Iteration, Ledger, PathStats, Setting, Transport};
 
 /// A layer of arbitrary output variables that the picture gets beside its colours.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -97,8 +97,9 @@ impl Job {
         let start = Instant::now();
         let mut film = self.new_film(stop);
         let mut stats = Stats::default();
+        let transport = self.transport();
         while let Some(n) = next_pass(stop, film.spp(), start.elapsed()) {
-            let pass = self.add_samples(&mut film, n);
+            let pass = self.add_pass(&transport, &mut film, n);
             stats.rays += pass.rays;
             stats.invalid.merge(pass.invalid);
             stats.seconds = start.elapsed().as_secs_f64();
@@ -109,58 +110,132 @@ impl Job {
         (film, stats)
     }
 
+    /// The integrator, ready to take samples.
+    fn transport(&self) -> Transport<'_> {
+        let setting = Setting {
+            scene: &self.scene,
+            camera: &self.camera,
+            film: &self.film,
+            sampler: self.sampler,
+            seed: self.seed,
+        };
+        Transport::new(&self.integrator, setting)
+    }
+
     /// Takes the next `n` samples of every pixel, on all threads of the current pool.
     pub fn add_samples(&self, film: &mut Film, n: u64) -> Stats {
+        self.add_pass(&self.transport(), film, n)
+    }
+
+    fn add_pass(&self, transport: &Transport, film: &mut Film, n: u64) -> Stats {
         let start = Instant::now();
-        let filter = FilterSampler::new(&self.film.filter);
-        let first = film.spp();
-        let work = |tile: &mut Tile| self.render_tile(tile, first, n, &filter);
-        let done: Vec<(PathStats, Invalid)> = film.tiles_mut().par_iter_mut().map(work).collect();
-        film.finish_pass(n);
-        let mut stats = Stats {
-            seconds: start.elapsed().as_secs_f64(),
-            ..Stats::default()
-        };
-        for (rays, invalid) in done {
-            stats.rays += rays;
-            stats.invalid.merge(invalid);
+        let mut stats = Stats::default();
+        if transport.iterates() {
+            let mut splats = SplatBuffer::new(self.film.crop, self.film.filter);
+            for _ in 0..n {
+                self.add_iteration(transport, film, 1, &mut stats, Some(&mut splats));
+            }
+        } else {
+            self.add_iteration(transport, film, n, &mut stats, None);
         }
+        stats.seconds = start.elapsed().as_secs_f64();
         stats
     }
 
-    /// Adds the samples `first..first + n` of every pixel of the tile.
-    fn render_tile(
+    /// Takes the next `n` samples of every pixel, which share what the first of them begins.
+    fn add_iteration(
         &self,
-        tile: &mut Tile,
-        first: u64,
+        transport: &Transport,
+        film: &mut Film,
         n: u64,
-        filter: &FilterSampler,
-    ) -> (PathStats, Invalid) {
-        let (mut rays, mut invalid) = (PathStats::default(), Invalid::default());
-        let aovs: Vec<Aov> = self.aovs.iter().map(|l| l.aov).collect();
+        stats: &mut Stats,
+        splats: Option<&mut SplatBuffer>,
+    ) {
+        let filter = FilterSampler::new(&self.film.filter);
+        let first = film.spp();
+        let mut ledger = Ledger::default();
+        let iteration = transport.begin(first, &mut ledger);
+        let pass = Pass {
+            job: self,
+            transport,
+            iteration: &iteration,
+            filter: &filter,
+            moving: self.camera.moves() || self.scene.moves(),
+            samples: first..first + n,
+        };
+        let work = |tile: &mut Tile| pass.render_tile(tile);
+        let done: Vec<(Ledger, Invalid)> = film.tiles_mut().par_iter_mut().map(work).collect();
+        stats.rays += ledger.rays;
+        for (ledger, invalid) in &done {
+            stats.rays += ledger.rays;
+            stats.invalid.merge(invalid.clone());
+        }
+        if let Some(splats) = splats {
+            let all = done.iter().flat_map(|(ledger, _)| &ledger.splats);
+            let mut any = false;
+            for splat in all {
+                let value = splat.value;
+                if value.is_finite() && value.min_component() >= 0.0 {
+                    any = true;
+                    splats.add(splat);
+                } else {
+                    let pixel = splat.film.floor().max(Vec2::ZERO).as_uvec2();
+                    let first_one = Some((pixel.x, pixel.y, first, value));
+                    stats.invalid.merge(Invalid {
+                        count: 1,
+                        first: first_one,
+                    });
+                }
+            }
+            if any {
+                film.add_everywhere(&splats.take());
+            }
+        }
+        film.finish_pass(n);
+    }
+}
+
+/// Samples that every tile takes.
+struct Pass<'a> {
+    job: &'a Job,
+    transport: &'a Transport<'a>,
+    iteration: &'a Iteration,
+    filter: &'a FilterSampler,
+    moving: bool,
+    samples: Range<u64>,
+}
+
+impl Pass<'_> {
+    /// Adds the samples to every pixel of the tile.
+    fn render_tile(&self, tile: &mut Tile) -> (Ledger, Invalid) {
+        let job = self.job;
+        let (mut ledger, mut invalid) = (Ledger::default(), Invalid::default());
+        let aovs: Vec<Aov> = job.aovs.iter().map(|l| l.aov).collect();
         let mut aov_values = Vec::new();
         let replicates = tile.replicates();
-        let moving = self.camera.moves() || self.scene.moves();
         for y in 0..tile.height {
             for x in 0..tile.width {
-                let (px, py) = (self.film.crop.x + tile.x + x, self.film.crop.y + tile.y + y);
+                let (px, py) = (job.film.crop.x + tile.x + x, job.film.crop.y + tile.y + y);
                 // The pixel's number in the full picture, so that a crop shows the same samples.
-                let pixel = u64::from(py) * u64::from(self.film.width) + u64::from(px);
-                for s in first..first + n {
-                    let sampler = Sampler::new(self.sampler, self.seed, pixel, s, replicates);
+                let pixel = u64::from(py) * u64::from(job.film.width) + u64::from(px);
+                for s in self.samples.clone() {
+                    let sampler = Sampler::new(job.sampler, job.seed, pixel, s, replicates);
                     let [u, v, lens_u, lens_v] = sampler.get4(dim::CAMERA);
-                    let (offset, weight) = filter.sample(Vec2::new(u, v));
-                    let time = match moving {
-                        true => sampler.get4(dim::TIME)[0],
-                        false => 0.0,
+                    let (offset, weight) = self.filter.sample(Vec2::new(u, v));
+                    let time = match (self.moving, self.iteration.time) {
+                        (false, _) => 0.0,
+                        (true, Some(time)) => time,
+                        (true, None) => sampler.get4(dim::TIME)[0],
                     };
-                    let seen = self.camera.ray(&CameraSample {
+                    let at = CameraSample {
                         film: Vec2::new(px as f32 + 0.5, py as f32 + 0.5) + offset,
                         lens: Vec2::new(lens_u, lens_v),
                         time,
-                    });
+                    };
+                    let seen = job.camera.ray(&at);
                     let ray = seen.ray;
-                    let mut li = self.integrator.li(&self.scene, ray, &sampler, &mut rays);
+                    let (transport, iteration) = (self.transport, self.iteration);
+                    let mut li = transport.sample(iteration, &at, ray, &sampler, &mut ledger);
                     li.radiance *= seen.weight;
                     let radiance = li.radiance;
                     // A NaN fails the comparison too.
@@ -173,14 +248,14 @@ impl Job {
                     if !aovs.is_empty() {
                         aov_values.clear();
                         let [.., u] = sampler.get4(dim::VERTEX + dim::CHOICES);
-                        aov::evaluate(&self.scene, &ray, &li, u, &aovs, &mut aov_values);
+                        aov::evaluate(&job.scene, &ray, &li, u, &aovs, &mut aov_values);
                         aov_values.iter_mut().for_each(|v| *v *= weight);
                         tile.add_aov(x, y, &aov_values);
                     }
                 }
             }
         }
-        (rays, invalid)
+        (ledger, invalid)
     }
 }
 

@@ -7,7 +7,9 @@ pub use camera::{Camera, CameraSample};
 pub use plan::{Plan, PlanEntry};
 
 use crate::geom::{Geometry, Hit, Ray, ShapeId, World};
-use crate::light::{Emitter, EmitterSample, Lights, Strategy};
+use crate::light::{
+    Aim, Emission, EmissionNumbers, EmissionPdf, Emitter, EmitterSample, Lights, Source, Strategy,
+};
 use crate::material::{self, Material, Shading};
 use crate::math::{DVec3, Rgb, Vec2, Vec3};
 
@@ -124,6 +126,15 @@ impl Scene {
         self.material(hit).shade(hit, u, || self.world.dp_duv(hit))
     }
 
+    /// The surface of `shading`, which was made for `hit` and `u`, seen from the unit vector `wo` instead.
+    #[inline]
+    pub fn seen_from(&self, hit: &Hit, shading: &Shading, u: f32, wo: Vec3) -> Shading {
+        match shading.is_bent() {
+            true => self.shade(&Hit { wo, ..*hit }, u),
+            false => shading.turned_to(wo),
+        }
+    }
+
     /// Whether [`Scene::shade`] uses `u` for some material.
     #[inline]
     pub fn materials_are_mixed(&self) -> bool {
@@ -196,6 +207,53 @@ impl Scene {
     #[inline]
     pub fn pdf_light_escaped(&self, from: &Hit, d: Vec3) -> f32 {
         self.lights.pdf_escaped(from, d)
+    }
+
+    /// Light that leaves one of the emitters; see [`Lights::sample_emission`].
+    #[inline]
+    pub fn sample_emission(&self, aim: &Aim, u: &EmissionNumbers) -> Option<Emission> {
+        self.lights.sample_emission(self.world.geometries(), aim, u)
+    }
+
+    /// As [`Scene::sample_light`], with the densities of the light that would have come from there by
+    /// emission.
+    #[inline]
+    pub fn sample_light_both_ways(
+        &self,
+        aim: &Aim,
+        from: &Hit,
+        u_pick: f32,
+        u: Vec2,
+    ) -> Option<(EmitterSample, EmissionPdf)> {
+        let geoms = self.world.geometries();
+        self.lights.sample_both_ways(geoms, aim, from, u_pick, u)
+    }
+
+    /// Densities with which light is emitted at `met` along `met.wo`; `None` for what does not shine there.
+    #[inline]
+    pub fn pdf_emission(&self, aim: &Aim, met: &Hit) -> Option<EmissionPdf> {
+        self.lights.pdf_emission(self.world.geometries(), aim, met)
+    }
+
+    /// The same for light from infinity that arrives at `at` from the direction `wi`.
+    #[inline]
+    pub fn pdf_emission_escaped(&self, aim: &Aim, at: &Hit, wi: Vec3) -> Option<EmissionPdf> {
+        self.lights.pdf_emission_escaped(aim, at, wi)
+    }
+
+    /// Density with which [`Scene::sample_light`] connects `from` to `source`, in the measure of
+    /// [`EmissionPdf::start`].
+    #[inline]
+    pub fn pdf_connection(&self, from: &Hit, source: &Source) -> f32 {
+        self.lights
+            .pdf_connection(self.world.geometries(), from, source)
+    }
+
+    /// Whether the surface at `hit` has a lobe that is not a delta one: light that arrives there is worth
+    /// remembering, whatever chance makes of the material.
+    #[inline]
+    pub fn receives(&self, hit: &Hit) -> bool {
+        self.material(hit).receives()
     }
 
     /// Chooses among the lights by `strategy` from now on: for comparisons, since the one that is chosen by

@@ -3,22 +3,33 @@
 //! One camera walk ([`path`]) and one direct-light function ([`direct_light`]) serve every integrator here.
 
 pub mod aov;
+mod bidir;
+mod ledger;
+pub mod light_walk;
+pub mod mis;
 mod path;
+pub mod photons;
 
+pub use bidir::{BidirSpec, Method};
+pub use ledger::{Ledger, PathStats, Technique};
 pub use path::{DirectSpec, PathSpec};
+pub use photons::PhotonSpec;
 
 use crate::bsdf::Mode;
+use crate::film::FilmSpec;
 use crate::geom::{Hit, Ray};
 use crate::material::Shading;
 use crate::math::{Rgb, Vec2};
-use crate::sampler::{Sampler, dim};
-use crate::scene::Scene;
+use crate::sampler::{Sampler, SamplerKind, dim};
+use crate::scene::{Camera, CameraSample, Scene};
 
 /// Which estimator computes the picture, and its settings.
 #[derive(Clone, Debug, PartialEq)]
 pub enum IntegratorSpec {
     Path(PathSpec),
     Direct(DirectSpec),
+    /// Light and eye subpaths, joined.
+    Bidirectional(BidirSpec),
 }
 
 impl IntegratorSpec {
@@ -26,20 +37,95 @@ impl IntegratorSpec {
         match self {
             IntegratorSpec::Path(_) => "path",
             IntegratorSpec::Direct(_) => "direct",
+            IntegratorSpec::Bidirectional(spec) => spec.method.name(),
         }
     }
 
-    /// Whether the estimator is biased: neither of these is.
+    /// Whether the estimator is biased at any finite number of samples.
     pub fn biased(&self) -> bool {
-        false
+        match self {
+            IntegratorSpec::Path(_) | IntegratorSpec::Direct(_) => false,
+            IntegratorSpec::Bidirectional(spec) => spec.method.merges(),
+        }
+    }
+}
+
+/// An integrator at work on a scene.
+#[derive(Clone, Copy, Debug)]
+pub struct Setting<'a> {
+    pub scene: &'a Scene,
+    pub camera: &'a Camera,
+    pub film: &'a FilmSpec,
+    pub sampler: SamplerKind,
+    pub seed: u64,
+}
+
+/// An integrator ready to take samples.
+pub struct Transport<'a> {
+    setting: Setting<'a>,
+    work: Work<'a>,
+}
+
+enum Work<'a> {
+    Path(&'a PathSpec),
+    Direct(&'a DirectSpec),
+    Bidirectional(bidir::Engine<'a>),
+}
+
+/// What all samples of one iteration share. A function of scene, seed and the iteration's number alone.
+#[derive(Default)]
+pub struct Iteration {
+    /// When all light of the iteration travels, where light and eye must agree on it.
+    pub time: Option<f32>,
+    photons: Option<bidir::Photons>,
+}
+
+impl<'a> Transport<'a> {
+    /// Prepares what all iterations share.
+    pub fn new(spec: &'a IntegratorSpec, setting: Setting<'a>) -> Transport<'a> {
+        let work = match spec {
+            IntegratorSpec::Path(spec) => Work::Path(spec),
+            IntegratorSpec::Direct(spec) => Work::Direct(spec),
+            IntegratorSpec::Bidirectional(spec) => {
+                Work::Bidirectional(bidir::Engine::new(spec, setting))
+            }
+        };
+        Transport { setting, work }
     }
 
-    /// Light that arrives against the direction of `ray`, one sample of it.
+    /// Whether each sample number is an iteration of its own: photons are shot for it, or light is splatted
+    /// all over the picture.
+    pub fn iterates(&self) -> bool {
+        match &self.work {
+            Work::Path(_) | Work::Direct(_) => false,
+            Work::Bidirectional(_) => true,
+        }
+    }
+
+    /// Begins the iteration of sample `number`, on all threads of the current pool.
+    pub fn begin(&self, number: u64, ledger: &mut Ledger) -> Iteration {
+        match &self.work {
+            Work::Path(_) | Work::Direct(_) => Iteration::default(),
+            Work::Bidirectional(engine) => engine.begin(number, ledger),
+        }
+    }
+
+    /// One sample of the radiance along `ray`, which the camera made of `at`; `sampler` is that of sample
+    /// `number` of the pixel.
     #[inline]
-    pub fn li(&self, scene: &Scene, ray: Ray, sampler: &Sampler, stats: &mut PathStats) -> Li {
-        match self {
-            IntegratorSpec::Path(spec) => spec.li(scene, ray, sampler, stats),
-            IntegratorSpec::Direct(spec) => spec.li(scene, ray, sampler, stats),
+    pub fn sample(
+        &self,
+        iteration: &Iteration,
+        at: &CameraSample,
+        ray: Ray,
+        sampler: &Sampler,
+        ledger: &mut Ledger,
+    ) -> Li {
+        let scene = self.setting.scene;
+        match &self.work {
+            Work::Path(spec) => spec.li(scene, ray, sampler, &mut ledger.rays),
+            Work::Direct(spec) => spec.li(scene, ray, sampler, &mut ledger.rays),
+            Work::Bidirectional(engine) => engine.sample(iteration, at, ray, sampler, ledger),
         }
     }
 }
@@ -50,28 +136,6 @@ pub struct Li {
     pub radiance: Rgb,
     /// Whether anything was seen: a surface that scatters light, or an environment that shines.
     pub seen: bool,
-}
-
-/// Rays traced, by purpose.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct PathStats {
-    pub camera: u64,
-    pub shadow: u64,
-    pub indirect: u64,
-}
-
-impl PathStats {
-    pub fn total(&self) -> u64 {
-        self.camera + self.shadow + self.indirect
-    }
-}
-
-impl std::ops::AddAssign for PathStats {
-    fn add_assign(&mut self, o: PathStats) {
-        self.camera += o.camera;
-        self.shadow += o.shadow;
-        self.indirect += o.indirect;
-    }
 }
 
 /// The rival strategy that a light sample shares the same paths with.

@@ -14,7 +14,7 @@ const UNBOUNDED: u32 = 1 << 20;
 
 /// Vertices whose numbers come from the sampler. After these a path depends on so many numbers that the
 /// spread of a few of them no longer shows in the picture, and independent ones are cheaper.
-const SPREAD_VERTICES: u32 = 4;
+pub(super) const SPREAD_VERTICES: u32 = 4;
 
 /// Settings of the path tracer.
 #[derive(Clone, Debug, PartialEq)]

@@ -5,9 +5,9 @@ use crate::format::plugins::Category;
 use crate::format::{Overrides, Props, SceneError};
 use crate::render::AovLayer;
 use crate::transport::aov::Aov;
-use crate::transport::{DirectSpec, IntegratorSpec, PathSpec};
+use crate::transport::{BidirSpec, DirectSpec, IntegratorSpec, Method, PathSpec, PhotonSpec};
 
-const NAMES: [&str; 2] = ["path", "direct"];
+const NAMES: [&str; 6] = ["path", "direct", "bdpt", "ptracer", "vcm", "sppm"];
 /// Names of `--aov`.
 const LAYERS: [(&str, Aov); 6] = [
     ("albedo", Aov::Albedo),
@@ -53,6 +53,7 @@ pub fn integrator(
     if let Some(depth) = overrides.max_depth {
         match &mut spec {
             IntegratorSpec::Path(path) => path.max_depth = depth_limit(depth),
+            IntegratorSpec::Bidirectional(spec) => spec.max_depth = depth_limit(depth),
             IntegratorSpec::Direct(_) => {
                 let what = "the integrator \"direct\" has no depth to set";
                 return Err(on_command_line("--max-depth", &depth.to_string(), what)
@@ -215,6 +216,16 @@ fn replaced(spec: IntegratorSpec, name: &str) -> Result<IntegratorSpec, SceneErr
     let hide_emitters = match &spec {
         IntegratorSpec::Path(p) => p.hide_emitters,
         IntegratorSpec::Direct(d) => d.hide_emitters,
+        IntegratorSpec::Bidirectional(b) => b.hide_emitters,
+    };
+    let bidirectional = |method| {
+        Ok(IntegratorSpec::Bidirectional(BidirSpec {
+            method,
+            max_depth: None,
+            rr_depth: DEFAULT_RR_DEPTH,
+            hide_emitters,
+            photons: PhotonSpec::default(),
+        }))
     };
     match name {
         _ if name == spec.name() => Ok(spec),
@@ -222,6 +233,10 @@ fn replaced(spec: IntegratorSpec, name: &str) -> Result<IntegratorSpec, SceneErr
             IntegratorSpec::Path(p) => IntegratorSpec::Path(PathSpec { hide_emitters, ..p }),
             other => other,
         }),
+        "bdpt" => bidirectional(Method::Bdpt),
+        "ptracer" => bidirectional(Method::Ptracer),
+        "vcm" => bidirectional(Method::Vcm),
+        "sppm" => bidirectional(Method::Sppm),
         "direct" => Ok(IntegratorSpec::Direct(DirectSpec {
             emitter_samples: 1,
             bsdf_samples: 1,

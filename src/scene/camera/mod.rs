@@ -4,6 +4,7 @@
 //! for the one pixel that it has. Where it stands is a [`View`], which may move while the shutter is open;
 //! what it makes of the picture is one of the files beside this one.
 
+mod connect;
 mod distant;
 mod irradiancemeter;
 mod lens;
@@ -13,6 +14,7 @@ mod radiancemeter;
 mod surface;
 mod view;
 
+pub use connect::Sight;
 pub use distant::{Distant, Target};
 pub use irradiancemeter::IrradianceMeter;
 pub use lens::{Aperture, Lens};

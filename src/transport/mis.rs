@@ -1,0 +1,138 @@
+//! Multiple importance sampling over all ways to find a path from both ends.
+//!
+//! A path x_0 (on an emitter) … x_k (the camera) can be found with s vertices made by the light's walk and the
+//! rest by the eye's, for each s, and by merging at x_i, where both walks make x_i to within a disk. Let
+//! p_i be the density per area with which the walk in question made x_i and q_i that of the other walk. A
+//! walk sums up, vertex by vertex, the densities of all techniques that cut the path behind it, relative
+//! to its own: with S_i for those up to the edge before x_i, relative to the technique that cuts there,
+//!
+//! ```text
+//! S_i     = c_i + q_{i-1} (S_{i-1} / p_{i-1} + m_{i-1} eta)
+//! ```
+//!
+//! where c_i is 1 if the edge can be cut, m_i is 1 if walks can be merged at x_i, eta is the area of the disk
+//! times the number of photons, and every density ratio is raised to the power of the heuristic. q_{i-1}
+//! depends on where the walk goes from x_i, so a [`State`] keeps its factor apart. This is the recursion of
+//! Georgiev et al. 2012 ("Light transport simulation with vertex connection and merging") with every
+//! technique switched by itself. Delta lobes count as density 1 in both directions, and no edge at them can
+//! be cut. Whatever the densities are called, the weights of one path sum to one.
+
+use crate::bsdf::Density;
+
+/// The power heuristic's exponent is 2 (Veach 1997, section 9.2.4).
+#[inline]
+pub fn power(ratio: f64) -> f64 {
+    ratio * ratio
+}
+
+/// Ways to find paths, switched one by one.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Techniques {
+    /// The walk from the eye runs into emitters.
+    pub emission: bool,
+    /// Vertices of the eye's walk are connected to emitters.
+    pub next_event: bool,
+    /// Vertices of both walks are connected.
+    pub connection: bool,
+    /// Walks from lights per iteration that are connected to the camera; 0 for none.
+    pub splats: f64,
+    /// Photons per iteration times the area of the disk that they are gathered from; 0 for none.
+    pub merging: f64,
+}
+
+impl Techniques {
+    /// Whether there is more than one, so that weights must be known.
+    pub fn weighs(&self) -> bool {
+        self.emission || self.next_event || self.connection || self.splats > 0.0
+    }
+}
+
+/// What a walk knows on arriving at a vertex.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct State {
+    /// Density per area with which the walk made this vertex.
+    pub pdf: f64,
+    /// What the power of the density (per steradian) of going back from here is multiplied with.
+    pub reverse: f64,
+    /// The same without merging at the vertex before.
+    pub reverse_unmerged: f64,
+    /// Density, relative to this walk's, of the cut just before this vertex, if it has a lobe that is not a
+    /// delta one.
+    pub cut: f64,
+}
+
+/// What a walk knows on leaving a vertex.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Leg {
+    /// Density per steradian of the direction.
+    onward: f64,
+    bracket: f64,
+    bracket_unmerged: f64,
+    cos: f64,
+    cut: f64,
+}
+
+impl State {
+    /// Sum over the cuts before this vertex, for a density `back` per steradian of going back.
+    #[inline]
+    pub fn sum(&self, back: f64) -> f64 {
+        self.cut + power(back) * self.reverse
+    }
+
+    /// That sum, and merging here if `merging` is its eta, over the density of this vertex: what the density
+    /// with which the other walk makes this vertex is multiplied with.
+    #[inline]
+    pub fn bracket(&self, back: f64, merging: f64) -> f64 {
+        self.sum(back) / power(self.pdf) + power(merging)
+    }
+
+    /// Goes on with density `onward` in a direction at cosine `cos`; `back` is the density per steradian of
+    /// going back. `merges` tells whether photons may be merged here.
+    #[inline]
+    pub fn leave(
+        &self,
+        techniques: &Techniques,
+        onward: Density,
+        back: impl FnOnce() -> f32,
+        cos: f64,
+        merges: bool,
+    ) -> Leg {
+        match onward {
+            Density::Delta => {
+                let bracket = self.reverse / power(self.pdf);
+                Leg {
+                    onward: 1.0,
+                    bracket,
+                    bracket_unmerged: bracket,
+                    cos,
+                    cut: 0.0,
+                }
+            }
+            Density::PerSr(pdf) => {
+                let merging = if merges { techniques.merging } else { 0.0 };
+                let bracket_unmerged = self.sum(f64::from(back())) / power(self.pdf);
+                Leg {
+                    onward: f64::from(pdf),
+                    bracket: bracket_unmerged + power(merging),
+                    bracket_unmerged,
+                    cos,
+                    cut: if techniques.connection { 1.0 } else { 0.0 },
+                }
+            }
+        }
+    }
+}
+
+impl Leg {
+    /// Arrives after the squared distance `dist2` at a surface under the cosine `cos`.
+    #[inline]
+    pub fn arrive(&self, dist2: f64, cos: f64) -> State {
+        let back = power(self.cos / dist2);
+        State {
+            pdf: self.onward * cos / dist2,
+            reverse: back * self.bracket,
+            reverse_unmerged: back * self.bracket_unmerged,
+            cut: self.cut,
+        }
+    }
+}
