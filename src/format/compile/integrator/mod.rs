@@ -1,5 +1,7 @@
 //! The integrator, and the layers that its wrappers ask for.
 
+mod layers;
+
 use super::{on_command_line, suggest};
 use crate::format::plugins::Category;
 use crate::format::{Overrides, Props, SceneError};
@@ -8,41 +10,15 @@ use crate::transport::aov::Aov;
 use crate::transport::{BidirSpec, DirectSpec, IntegratorSpec, Method, PathSpec, PhotonSpec};
 
 const NAMES: [&str; 6] = ["path", "direct", "bdpt", "ptracer", "vcm", "sppm"];
-/// Names of `--aov`.
-const LAYERS: [(&str, Aov); 6] = [
-    ("albedo", Aov::Albedo),
-    ("normal", Aov::ShadingNormal),
-    ("depth", Aov::Depth),
-    ("position", Aov::Position),
-    ("uv", Aov::Uv),
-    ("shape_id", Aov::ShapeIndex),
-];
-/// Types of Mitsuba's `aov` integrator.
-const TYPES: [(&str, Aov); 8] = [
-    ("albedo", Aov::Albedo),
-    ("sh_normal", Aov::ShadingNormal),
-    ("geo_normal", Aov::GeometricNormal),
-    ("depth", Aov::Depth),
-    ("position", Aov::Position),
-    ("uv", Aov::Uv),
-    ("shape_index", Aov::ShapeIndex),
-    ("prim_index", Aov::PrimIndex),
-];
-/// Further types of Mitsuba's.
-const UNSUPPORTED: [&str; 5] = ["boundary_test", "dp_du", "dp_dv", "duv_dx", "duv_dy"];
-/// Layers that every picture has.
-const OWN_LAYERS: [&str; 2] = ["stderr", "spp"];
-/// Bytes of a layer's name: with the channel's they must stay below the 255 of an EXR file.
-const LAYER_NAME_BYTES: usize = 200;
 const DEFAULT_RR_DEPTH: u32 = 5;
 
 pub fn integrator(
     root: &Props,
     overrides: &Overrides,
 ) -> Result<(IntegratorSpec, Vec<AovLayer>), SceneError> {
-    let mut layers = Vec::new();
+    let mut found = Vec::new();
     let spec = match root.child(Category::Integrator) {
-        Some(props) => unwrap(&props, &mut layers)?,
+        Some(props) => unwrap(&props, &mut found)?,
         None => None,
     };
     let spec = spec.unwrap_or(default_path());
@@ -61,16 +37,8 @@ pub fn integrator(
             }
         }
     }
-    for name in &overrides.aovs {
-        let Some((_, aov)) = LAYERS.iter().find(|(n, _)| n == name) else {
-            let what = format!("unknown layer \"{name}\"");
-            return Err(
-                on_command_line("--aov", name, what).with_help(suggest(name, LAYERS.map(|l| l.0)))
-            );
-        };
-        add_layer(&mut layers, name, *aov).map_err(|what| on_command_line("--aov", name, what))?;
-    }
-    Ok((spec, layers))
+    layers::asked_for(overrides, &mut found)?;
+    Ok((spec, found))
 }
 
 fn default_path() -> IntegratorSpec {
@@ -86,7 +54,7 @@ fn depth_limit(depth: i64) -> Option<u32> {
 }
 
 /// The integrator inside any wrappers; `None` where wrappers hold none.
-fn unwrap(props: &Props, layers: &mut Vec<AovLayer>) -> Result<Option<IntegratorSpec>, SceneError> {
+fn unwrap(props: &Props, found: &mut Vec<AovLayer>) -> Result<Option<IntegratorSpec>, SceneError> {
     // How the work is divided changes nothing in the picture.
     props.ignore(&["samples_per_pass", "block_size"]);
     if props.float("timeout")? > 0.0 {
@@ -103,9 +71,9 @@ fn unwrap(props: &Props, layers: &mut Vec<AovLayer>) -> Result<Option<Integrator
         "direct" => direct(props, hide_emitters).map(Some),
         wrapper => {
             if wrapper == "moment" {
-                add_layer(layers, "m2", Aov::SecondMoment).map_err(|what| props.error(what))?;
+                layers::add(found, "m2", Aov::SecondMoment).map_err(|what| props.error(what))?;
             } else {
-                aov_layers(props, layers)?;
+                layers::of_wrapper(props, found)?;
             }
             let nested = props.children(Category::Integrator);
             let mut inner = None;
@@ -115,7 +83,7 @@ fn unwrap(props: &Props, layers: &mut Vec<AovLayer>) -> Result<Option<Integrator
                         format!("several integrators inside \"{wrapper}\" are not supported");
                     return Err(child.error(what).with_help("keep one of them"));
                 }
-                inner = unwrap(child, layers)?;
+                inner = unwrap(child, found)?;
             }
             if let Some(IntegratorSpec::Path(PathSpec {
                 hide_emitters: hide,
@@ -157,59 +125,6 @@ fn direct(props: &Props, hide_emitters: bool) -> Result<IntegratorSpec, SceneErr
 
 /// Most samples per hit of the direct integrator.
 const MAX_SPLIT: u32 = 1 << 16;
-
-fn aov_layers(props: &Props, layers: &mut Vec<AovLayer>) -> Result<(), SceneError> {
-    for part in props
-        .string("aovs")?
-        .split(',')
-        .map(str::trim)
-        .filter(|p| !p.is_empty())
-    {
-        let Some((name, kind)) = part.split_once(':') else {
-            let what = format!("expected name:type, found \"{part}\"");
-            return Err(props.error_at("aovs", what));
-        };
-        let (name, kind) = (name.trim(), kind.trim());
-        let Some((_, aov)) = TYPES.iter().find(|(n, _)| *n == kind) else {
-            let error = match UNSUPPORTED.contains(&kind) {
-                true => props.error_at(
-                    "aovs",
-                    format!("output variable \"{kind}\" is not supported"),
-                ),
-                false => {
-                    let what = format!("unknown type \"{kind}\" of output variable \"{name}\"");
-                    props.error_at("aovs", what)
-                }
-            };
-            return Err(error.with_help(suggest(kind, TYPES.map(|t| t.0))));
-        };
-        add_layer(layers, name, *aov).map_err(|what| props.error_at("aovs", what))?;
-    }
-    Ok(())
-}
-
-/// Adds a layer, or says why it could not be written once the picture is rendered.
-fn add_layer(layers: &mut Vec<AovLayer>, name: &str, aov: Aov) -> Result<(), String> {
-    if name.is_empty() {
-        return Err("an output variable has no name".to_string());
-    }
-    if OWN_LAYERS.contains(&name) {
-        return Err(format!(
-            "\"{name}\" is the name of a layer that every picture has"
-        ));
-    }
-    if name.len() > LAYER_NAME_BYTES || name.chars().any(char::is_control) {
-        return Err("the name of an output variable is too long, or not printable".to_string());
-    }
-    if layers.iter().any(|l| l.name == name) {
-        return Err(format!("two layers would have the name \"{name}\""));
-    }
-    layers.push(AovLayer {
-        name: name.to_string(),
-        aov,
-    });
-    Ok(())
-}
 
 /// The integrator `name` with the settings it shares with `spec`.
 fn replaced(spec: IntegratorSpec, name: &str) -> Result<IntegratorSpec, SceneError> {
