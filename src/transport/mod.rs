@@ -58,6 +58,22 @@ pub struct Setting<'a> {
     pub film: &'a FilmSpec,
     pub sampler: SamplerKind,
     pub seed: u64,
+    /// That the samples of a pixel are dealt out to (see [`crate::sampler`]).
+    pub replicates: u32,
+}
+
+impl Setting<'_> {
+    /// When the light of iteration `number` travels, for integrators whose walks from both sides must agree
+    /// on it; `None` in a scene where that makes no difference. Well spread over the iterations of each
+    /// replicate.
+    pub fn common_time(&self, number: u64) -> Option<f32> {
+        /// No pixel has this number.
+        const NO_PIXEL: u64 = u64::MAX;
+        (self.scene.moves() || self.camera.moves()).then(|| {
+            let kind = SamplerKind::Sobol;
+            Sampler::new(kind, self.seed, NO_PIXEL, number, self.replicates).get4(dim::TIME)[0]
+        })
+    }
 }
 
 /// An integrator ready to take samples.

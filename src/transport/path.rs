@@ -10,7 +10,7 @@ use super::{Connect, Li, Mis, PathStats, VertexNumbers, direct_light};
 
 /// Longest path, in path vertices after the camera, when none is asked for: longer ones are cut. Only a
 /// closed scene of albedo 1 without Russian roulette gets here.
-const UNBOUNDED: u32 = 1 << 20;
+pub(super) const UNBOUNDED: u32 = 1 << 20;
 
 /// Vertices whose numbers come from the sampler. After these a path depends on so many numbers that the
 /// spread of a few of them no longer shows in the picture, and independent ones are cheaper.
@@ -76,7 +76,7 @@ fn emission(scene: &Scene, ray: &Ray, met: Option<&Hit>, departure: Option<Depar
 /// The first surface that the camera sees along `ray`. Hidden emitters are not there for the camera: it
 /// sees through them.
 #[inline]
-fn first_seen(
+pub(super) fn first_seen(
     scene: &Scene,
     mut ray: Ray,
     hide_emitters: bool,
