@@ -1,9 +1,11 @@
 //! Photons: light as it arrives at surfaces, stored to be gathered from the eye's side.
 
+mod kernel;
 mod map;
 mod radius;
 
-pub use map::PhotonMap;
+pub use kernel::{Kernel, KernelShape};
+pub use map::{PhotonMap, RADII};
 pub use radius::{footprint, reduced};
 
 /// How photons are shot and gathered.
