@@ -2,9 +2,11 @@
 
 mod map;
 mod radius;
+mod shoot;
 
 pub use map::PhotonMap;
 pub use radius::{footprint, reduced};
+pub use shoot::Volley;
 
 /// How photons are shot and gathered.
 #[derive(Clone, Debug, PartialEq)]
