@@ -37,6 +37,28 @@ const RR_DEPTH: Param = Param::int(
     5,
     "Depth from which Russian roulette may end a path.",
 );
+const PHOTON_COUNT: Param = Param::optional(
+    "photon_count",
+    Kind::Int(1, 1 << 31),
+    "Walks of light per iteration, that is per sample of each pixel; without it, as many as the image has pixels.",
+);
+const RADIUS: Param = Param::optional(
+    "radius",
+    Kind::Float(Range::Positive),
+    "Radius that photons are gathered from in the first iteration, in scene units; without it, two pixels as the camera sees the scene.",
+);
+const ALPHA: Param = Param::float(
+    "alpha",
+    Range::Open(0.0, 1.0),
+    0.75,
+    "How the radius shrinks from iteration to iteration: near 1 slowly, near 0 fast (Knaus and Zwicker 2011).",
+);
+const MEMORY: Param = Param::int(
+    "memory",
+    (1, 1 << 24),
+    4096,
+    "Most memory for photons, in MiB.",
+);
 const INTEGRATORS: &[Slot] = &[Slot::new(Category::Integrator, 0, usize::MAX)];
 
 const fn integrator(name: &'static str, params: &'static [Param], doc: &'static str) -> Plugin {
@@ -50,6 +72,27 @@ pub const PLUGINS: &[Plugin] = &[
         "path",
         &[MAX_DEPTH, RR_DEPTH, HIDE, PER_PASS, TIMEOUT, BLOCK],
         "Path tracing with next-event estimation and multiple importance sampling.",
+    ),
+    integrator(
+        "combined",
+        &[
+            Param::bool(
+                "caustics",
+                true,
+                "Find caustics by photons; without them, this is the integrator path.",
+            ),
+            MAX_DEPTH,
+            RR_DEPTH,
+            HIDE,
+            PHOTON_COUNT,
+            RADIUS,
+            ALPHA,
+            MEMORY,
+            PER_PASS,
+            TIMEOUT,
+            BLOCK,
+        ],
+        "Path tracing that leaves caustics to photons; biased by their radius, which shrinks; luxel only.",
     ),
     Plugin {
         exclusive: &[

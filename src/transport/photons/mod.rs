@@ -3,10 +3,12 @@
 mod kernel;
 mod map;
 mod radius;
+mod shoot;
 
 pub use kernel::{Kernel, KernelShape};
 pub use map::{PhotonMap, RADII};
 pub use radius::{footprint, reduced};
+pub use shoot::Volley;
 
 /// How photons are shot and gathered.
 #[derive(Clone, Debug, PartialEq)]
