@@ -162,11 +162,7 @@ fn what_is_not_a_number_or_too_large_is_not_added() {
 /// Radiance over the film: a ramp, stripes, and a narrow edge that no pixel's agrees with.
 fn light(film: Vec2) -> Rgb {
     let stripes = 1.0 + (2.1 * film.x).sin();
-    let step = if film.x * 0.6 + film.y > 12.3 {
-        1.0
-    } else {
-        0.2
-    };
+    let step = 0.2 + 0.8 * (2.0 * (film.x * 0.6 + film.y - 12.3)).clamp(0.0, 1.0);
     Rgb::new(0.1 + 0.05 * film.y, stripes, step)
 }
 

@@ -99,7 +99,7 @@ impl Engine<'_> {
         if scattered.is_black() {
             return;
         }
-        ledger.rays.shadow += 1;
+        ledger.connect(Technique::Splat);
         let seen = scene.transmittance(&hit.spawn_to(&sight.end), passes);
         if seen == 0.0 {
             return;
@@ -114,7 +114,6 @@ impl Engine<'_> {
         };
         let weight = seen * sight.importance / ((1.0 + rivals) * self.walks) as f32;
         let value = vertex.power * scattered * weight;
-        ledger.record(Technique::Splat, value);
         ledger.splats.push(Splat {
             film: sight.film,
             value,
@@ -166,7 +165,7 @@ impl EyeWalk<'_> {
         if f_cos.is_black() {
             return Rgb::BLACK;
         }
-        ledger.rays.shadow += 1;
+        ledger.connect(Technique::NextEvent);
         let passes = self.engine.max_depth - vertex.edges - 1;
         let seen = scene.transmittance(&light.shadow_ray(hit), passes);
         if seen == 0.0 {
@@ -212,7 +211,7 @@ impl EyeWalk<'_> {
             p_err: from.p_err,
             ng: from.ng,
         };
-        ledger.rays.shadow += 1;
+        ledger.connect(Technique::Connection);
         let seen = scene.transmittance(&hit.spawn_to(&end), passes);
         if seen == 0.0 {
             return Rgb::BLACK;

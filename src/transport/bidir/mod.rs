@@ -158,7 +158,7 @@ impl<'a> Engine<'a> {
         Iteration {
             time,
             photons: Some(Photons {
-                map: PhotonMap::new(found, radius),
+                map: ledger.build_map(|| PhotonMap::new(found, radius)),
                 density: (1.0 / techniques.merging) as f32,
                 techniques,
             }),

@@ -153,7 +153,7 @@ impl<'a> Combined<'a> {
         let found = volley.shoot(self.count, ledger, |vertex| {
             CausticPhoton::of(self.setting.scene, vertex)
         });
-        let map = PhotonMap::new(found, radius);
+        let map = ledger.build_map(|| PhotonMap::new(found, radius));
         let area = f64::from(PI) * f64::from(map.radius()).powi(2);
         Iteration {
             time,
@@ -184,6 +184,7 @@ impl<'a> Combined<'a> {
         let (scene, start) = (self.setting.scene, Start::at_camera(ray));
         let li = path.walk(scene, start, sampler, &mut ledger.rays, &mut gathering);
         ledger.record(Technique::Merging, gathering.found);
+        ledger.record(Technique::Path, li.radiance - gathering.found);
         li
     }
 }
