@@ -3,10 +3,12 @@
 mod kernel;
 mod map;
 mod radius;
+mod trace;
 
 pub use kernel::{Kernel, KernelShape};
 pub use map::{PhotonMap, RADII};
 pub use radius::{footprint, reduced};
+pub use trace::{Shoot, Tally};
 
 /// How photons are shot and gathered.
 #[derive(Clone, Debug, PartialEq)]
