@@ -4,11 +4,13 @@ mod kernel;
 mod map;
 mod radius;
 mod shoot;
+mod trace;
 
 pub use kernel::{Kernel, KernelShape};
 pub use map::{PhotonMap, RADII};
 pub use radius::{footprint, reduced};
 pub use shoot::Volley;
+pub use trace::{Shoot, Tally};
 
 /// How photons are shot and gathered.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::math::{Rgb, Vec3};
+use crate::math::Vec3;
 use crate::sampler::{Sampler, mix};
 use crate::transport::light_walk::{LightVertex, LightWalk};
 use crate::transport::{Ledger, PathStats, Setting};
@@ -105,13 +105,13 @@ impl Volley<'_> {
         i: u64,
         found: &mut Found<T>,
         keep: &impl Fn(&LightVertex) -> Option<T>,
-    ) -> Rgb {
+    ) {
         let Setting { sampler, seed, .. } = self.setting;
         let sampler = Sampler::new(sampler, mix(seed ^ self.stream), self.number, i, 1);
         let Found { photons, rays } = found;
         self.walk.walk(&sampler, self.time, rays, |vertex| {
             photons.extend(keep(vertex).map(|photon| (vertex.hit.p, photon)));
             true
-        })
+        });
     }
 }
