@@ -36,7 +36,8 @@ fn cameras() -> Vec<(&'static str, Compiled)> {
     let wide = "<float name='fov' value='100'/>";
     let lens =
         "<float name='aperture_radius' value='0.3'/><float name='focus_distance' value='5'/>";
-    let blades = "<integer name='aperture_blades' value='5'/><float name='blade_rotation' value='20'/>";
+    let blades =
+        "<integer name='aperture_blades' value='5'/><float name='blade_rotation' value='20'/>";
     let shifted = "<float name='principal_point_offset_x' value='0.1'/>
         <float name='principal_point_offset_y' value='-0.2'/>";
     let all = [
