@@ -47,6 +47,12 @@ impl Filter {
         (0..CELLS).map(|i| self.at_cell(i)).sum::<f64>() * f64::from(width)
     }
 
+    /// Largest magnitude of [`Filter::eval`].
+    pub fn peak(&self) -> f64 {
+        let cells = (0..CELLS).map(|i| self.at_cell(i).abs());
+        cells.fold(f64::from(self.eval(0.0)).abs(), f64::max)
+    }
+
     /// Value in the middle of cell `i`.
     fn at_cell(&self, i: usize) -> f64 {
         let width = 2.0 * self.radius() / CELLS as f32;

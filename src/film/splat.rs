@@ -15,8 +15,8 @@ pub struct Splat {
 ///
 /// A splat of value v at x adds v h(x - c) to the pixel of centre c, with the reconstruction filter h of
 /// integral 1 over the film: in the mean what camera samples, drawn from the same filter, give for the same
-/// light. Each such term is rounded to a multiple of 2^-88 (3e-27), so terms down to 1e-19 are kept to the 24
-/// bits of an f32 and anything below 1e-27 is lost; sums are exact from there on.
+/// light. The weights h are rounded to 2^-30 of the largest and each term to a multiple of 2^-88 (3e-27), so
+/// splats down to 1e-18 are kept to 24 bits and what is below 1e-27 is lost; sums are exact from there on.
 #[derive(Clone, Debug)]
 pub struct SplatBuffer {
     window: Window,
@@ -25,18 +25,14 @@ pub struct SplatBuffer {
     sums: Vec<[Fixed; 3]>,
 }
 
-/// Largest splat, 2^72: more than 10^9 of them can meet in a pixel before its sum leaves the range.
-const LARGEST: f32 = (1u128 << 72) as f32;
-
-/// What filters narrower than a tenth of a pixel could exceed with such splats.
-const LARGEST_TERM: f64 = (1u128 << 80) as f64;
-
 /// Part of the buffer: some rows of the window, which can be filled beside other parts.
 #[derive(Debug)]
 pub struct SplatBand<'a> {
     window: Window,
     kernel: Kernel,
     sums: &'a mut [[Fixed; 3]],
+    /// Weights of the columns of the splat under way.
+    columns: Vec<f64>,
 }
 
 impl SplatBuffer {
@@ -49,9 +45,10 @@ impl SplatBuffer {
         }
     }
 
-    /// Whether a splat of this value can be added: finite, and not above 2^72 (5e21).
-    pub fn accepts(value: Rgb) -> bool {
-        value.to_array().iter().all(|v| v.abs() <= LARGEST)
+    /// Whether a splat of this value can be added: finite, and not above 2^72 (5e21), or less where the filter
+    /// is narrower than a pixel.
+    pub fn accepts(&self, value: Rgb) -> bool {
+        self.kernel.accepts(value)
     }
 
     /// Adds to the pixels that the reconstruction filter spreads the splat over; none for a splat that is
@@ -78,6 +75,7 @@ impl SplatBuffer {
                 },
                 kernel,
                 sums,
+                columns: Vec::new(),
             }
         };
         bands.map(band).collect()
@@ -94,7 +92,42 @@ impl SplatBuffer {
     }
 }
 
-/// First pixel along one axis, of `window` pixels from `first` on, whose filter reaches `x`, and the number
+impl SplatBand<'_> {
+    /// Adds the splat to those pixels of the band that the reconstruction filter spreads it over. None for
+    /// a splat that is not one of [`SplatBuffer::accepts`].
+    pub fn add(&mut self, splat: &Splat) {
+        let Splat { film, value } = *splat;
+        let (window, kernel) = (self.window, self.kernel);
+        let (y0, rows) = reached(film.y, kernel.radius, window.y, window.height);
+        if rows == 0 || !kernel.accepts(value) {
+            return;
+        }
+        let (x0, columns) = reached(film.x, kernel.radius, window.x, window.width);
+        if columns == 0 {
+            return;
+        }
+        let weight = |at: f32, pixel: u32| kernel.weight(at - (pixel as f32 + 0.5));
+        self.columns.clear();
+        self.columns
+            .extend((x0..x0 + columns).map(|x| weight(film.x, x)));
+        let factors = value.to_array().map(|v| Factor::new(v, kernel.exponent));
+        for y in y0..y0 + rows {
+            let of_row = weight(film.y, y) * 2f64.powi(kernel.exponent);
+            let first = (y - window.y) as usize * window.width as usize + (x0 - window.x) as usize;
+            let pixels = &mut self.sums[first..first + columns as usize];
+            for (pixel, of_column) in pixels.iter_mut().zip(&self.columns) {
+                // Halves away from zero, so that a splat and its negative cancel.
+                let weight = of_row * of_column;
+                let weight = (weight + 0.5f64.copysign(weight)) as i64;
+                for (sum, factor) in pixel.iter_mut().zip(factors) {
+                    sum.add(factor, weight);
+                }
+            }
+        }
+    }
+}
+
+/// First pixel along one axis, of `count` pixels from `first` on, whose filter reaches `x`, and the number
 /// of those that do.
 fn reached(x: f32, radius: f32, first: u32, count: u32) -> (u32, u32) {
     // Centres c with x - radius < c <= x + radius, so that boxes side by side share no point.
@@ -106,47 +139,34 @@ fn reached(x: f32, radius: f32, first: u32, count: u32) -> (u32, u32) {
     (lo.max(0) as u32, (hi - lo).max(0) as u32)
 }
 
-impl SplatBand<'_> {
-    /// Adds the splat to those pixels of the band that the reconstruction filter spreads it over. None for
-    /// a splat that is not one of [`SplatBuffer::accepts`].
-    pub fn add(&mut self, splat: &Splat) {
-        let Splat { film, value } = *splat;
-        let (window, kernel) = (self.window, self.kernel);
-        let (y0, rows) = reached(film.y, kernel.radius, window.y, window.height);
-        if rows == 0 || !SplatBuffer::accepts(value) {
-            return;
-        }
-        let (x0, columns) = reached(film.x, kernel.radius, window.x, window.width);
-        let value = value.to_array().map(f64::from);
-        for y in y0..y0 + rows {
-            let wy = kernel.weight(film.y - (y as f32 + 0.5));
-            let row = (y - window.y) as usize * window.width as usize;
-            for x in x0..x0 + columns {
-                let weight = wy * kernel.weight(film.x - (x as f32 + 0.5));
-                let sum = &mut self.sums[row + (x - window.x) as usize];
-                for (sum, v) in sum.iter_mut().zip(value) {
-                    sum.add(v * weight);
-                }
-            }
-        }
-    }
-}
-
 /// The filter along one axis, normalised to integral 1.
 #[derive(Clone, Copy, Debug)]
 struct Kernel {
     filter: Filter,
     radius: f32,
     scale: f64,
+    /// Weights of pixels count in units of two to the power of minus this: at most 2^30 of them.
+    exponent: i32,
+    /// Largest splat.
+    largest: f32,
 }
 
 impl Kernel {
     fn new(filter: Filter) -> Kernel {
+        let scale = 1.0 / filter.integral();
+        let peak = (filter.peak() * scale).powi(2);
         Kernel {
             filter,
             radius: filter.radius(),
-            scale: 1.0 / filter.integral(),
+            scale,
+            exponent: 30 - peak.log2().ceil() as i32,
+            // More than 10^9 of them can meet in a pixel before its sum leaves the range of 2^103.
+            largest: (2f64.powi(72) / peak.max(1.0)) as f32,
         }
+    }
+
+    fn accepts(&self, value: Rgb) -> bool {
+        value.to_array().iter().all(|v| v.abs() <= self.largest)
     }
 
     #[inline]
@@ -155,6 +175,30 @@ impl Kernel {
             // Which pixels a box reaches is decided already.
             Filter::Box { .. } => self.scale,
             _ => f64::from(self.filter.eval(x)) * self.scale,
+        }
+    }
+}
+
+/// The value of one channel of a splat, ready to be multiplied with weights.
+#[derive(Clone, Copy, Debug)]
+struct Factor {
+    /// At most 2^24 from zero.
+    significand: i64,
+    /// Binary places from the unit of [`Fixed`] up to that of the product with a weight.
+    shift: i32,
+}
+
+impl Factor {
+    #[inline]
+    fn new(v: f32, weight_exponent: i32) -> Factor {
+        let bits = v.to_bits();
+        let exponent = ((bits >> 23) & 0xff) as i32;
+        let fraction = i64::from(bits & ((1 << 23) - 1));
+        // Numbers too small for a leading one are lost anyway.
+        let magnitude = if exponent == 0 { 0 } else { fraction | 1 << 23 };
+        Factor {
+            significand: if v < 0.0 { -magnitude } else { magnitude },
+            shift: exponent - 150 + FRACTION_BITS - weight_exponent,
         }
     }
 }
@@ -168,40 +212,34 @@ const FRACTION_BITS: i32 = 88;
 impl Fixed {
     const ZERO: Fixed = Fixed([0; 3]);
 
-    /// Adds `v`, held within 2^80 of zero and rounded to the nearest unit, halves away from zero.
+    /// Adds the factor times `weight`, of at most 2^31, rounded to the nearest unit, halves away from zero.
     #[inline]
-    fn add(&mut self, v: f64) {
-        let v = v.clamp(-LARGEST_TERM, LARGEST_TERM);
-        let bits = v.to_bits();
-        let exponent = ((bits >> 52) & 0x7ff) as i32;
-        let significand = (bits & ((1 << 52) - 1)) | (1 << 52);
-        // v is the significand times 2^(exponent - 1075).
-        let shift = exponent - 1075 + FRACTION_BITS;
-        let (place, wide) = match shift {
-            ..-53 => return,
-            -53..0 => {
-                let half = 1u64 << (-shift - 1);
-                (0, u128::from((significand + half) >> -shift))
+    fn add(&mut self, factor: Factor, weight: i64) {
+        let product = factor.significand * weight;
+        let [low, middle, high] = &mut self.0;
+        match factor.shift {
+            ..-62 => {}
+            shift @ -62..64 => {
+                let term = match shift {
+                    0.. => i128::from(product) << shift,
+                    _ => {
+                        let half = 1u64 << (-shift - 1);
+                        let magnitude = (product.unsigned_abs() + half) >> -shift;
+                        i128::from(magnitude as i64) * i128::from(product.signum())
+                    }
+                };
+                let sum = u128::from(*low) | u128::from(*middle) << 64;
+                let (sum, carry) = sum.overflowing_add(term as u128);
+                (*low, *middle) = (sum as u64, (sum >> 64) as u64);
+                let extension = if term < 0 { u64::MAX } else { 0 };
+                *high = high.wrapping_add(extension).wrapping_add(u64::from(carry));
             }
-            _ => (shift / 64, u128::from(significand) << (shift % 64)),
-        };
-        let (low, high) = (wide as u64, (wide >> 64) as u64);
-        let mut term = match place {
-            0 => [low, high, 0],
-            1 => [0, low, high],
-            _ => [0, 0, low],
-        };
-        let mut carry = false;
-        if v < 0.0 {
-            // Minus a number is its complement plus one.
-            term = term.map(|t| !t);
-            carry = true;
-        }
-        for (sum, t) in self.0.iter_mut().zip(term) {
-            let (s, first) = sum.overflowing_add(t);
-            let (s, second) = s.overflowing_add(u64::from(carry));
-            *sum = s;
-            carry = first || second;
+            shift => {
+                let term = i128::from(product) << (shift - 64).min(127);
+                let sum = u128::from(*middle) | u128::from(*high) << 64;
+                let sum = sum.wrapping_add(term as u128);
+                (*middle, *high) = (sum as u64, (sum >> 64) as u64);
+            }
         }
     }
 
