@@ -153,16 +153,7 @@ const TABLE: &[(Category, &[&str], &str)] = &[
     (
         Integrator,
         &[
-            "ptracer",
-            "photonmapper",
-            "ppm",
-            "sppm",
-            "bdpt",
-            "mlt",
-            "pssmlt",
-            "erpt",
-            "vpl",
-            "irrcache",
+            "ptracer", "ppm", "sppm", "bdpt", "mlt", "pssmlt", "erpt", "vpl", "irrcache",
             "adaptive",
         ],
         METHOD,

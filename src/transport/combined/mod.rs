@@ -19,7 +19,7 @@
 
 mod caustics;
 
-pub(super) use caustics::Caustics;
+pub(super) use caustics::{Caustics, caustic};
 
 use super::light_walk::LightWalk;
 use super::mis::Techniques;
@@ -31,7 +31,7 @@ use crate::light::Aim;
 use crate::math::PI;
 use crate::sampler::Sampler;
 use crate::scene::{PlanEntry, Scene};
-use caustics::{CausticPhoton, Gathering};
+use caustics::Gathering;
 
 /// Who finds caustics, and what else is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -151,7 +151,7 @@ impl<'a> Combined<'a> {
             time: time.unwrap_or(0.0),
         };
         let found = volley.shoot(self.count, ledger, |vertex| {
-            CausticPhoton::of(self.setting.scene, vertex)
+            caustic(self.setting.scene, vertex)
         });
         let map = PhotonMap::new(found, radius);
         let area = f64::from(PI) * f64::from(map.radius()).powi(2);

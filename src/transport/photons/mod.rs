@@ -1,10 +1,12 @@
 //! Photons: light as it arrives at surfaces, stored to be gathered from the eye's side.
 
 mod map;
+mod photon;
 mod radius;
 mod shoot;
 
 pub use map::PhotonMap;
+pub use photon::Photon;
 pub use radius::{footprint, reduced};
 pub use shoot::Volley;
 

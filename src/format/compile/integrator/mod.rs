@@ -12,8 +12,15 @@ use crate::transport::{
     BidirSpec, CombinedSpec, DirectSpec, IntegratorSpec, Method, PathSpec, PhotonSpec,
 };
 
-const NAMES: [&str; 7] = [
-    "path", "direct", "bdpt", "ptracer", "vcm", "sppm", "combined",
+const NAMES: [&str; 8] = [
+    "path",
+    "direct",
+    "bdpt",
+    "ptracer",
+    "vcm",
+    "sppm",
+    "combined",
+    "photonmapper",
 ];
 const DEFAULT_RR_DEPTH: u32 = 5;
 
@@ -63,6 +70,10 @@ fn unwrap(props: &Props, found: &mut Vec<AovLayer>) -> Result<Option<IntegratorS
             props,
             path(props, hide_emitters)?,
         )?))),
+        "photonmapper" => {
+            let spec = photons::photon_mapper(props, path(props, hide_emitters)?)?;
+            Ok(Some(IntegratorSpec::PhotonMapper(spec)))
+        }
         "direct" => direct(props, hide_emitters).map(Some),
         wrapper => {
             if wrapper == "moment" {
@@ -143,6 +154,7 @@ fn replaced(mut spec: IntegratorSpec, name: &str) -> Result<IntegratorSpec, Scen
         "vcm" => bidirectional(Method::Vcm),
         "sppm" => bidirectional(Method::Sppm),
         "combined" => IntegratorSpec::Combined(CombinedSpec::default()),
+        "photonmapper" => IntegratorSpec::PhotonMapper(PhotonMapperSpec::default()),
         "direct" => IntegratorSpec::Direct(DirectSpec {
             emitter_samples: 1,
             bsdf_samples: 1,

@@ -1,0 +1,52 @@
+//! A photon, and what it brings where it is gathered.
+
+use crate::bsdf::Mode;
+use crate::math::{Rgb, Vec3};
+use crate::transport::light_walk::LightVertex;
+use crate::transport::path::Vertex;
+
+/// Light as it arrives at a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Photon {
+    /// Unit direction to where it came from.
+    wi: Vec3,
+    /// Geometric normal of the surface.
+    ng: Vec3,
+    /// In W, times the number of walks.
+    power: Rgb,
+    /// From the emitter to here.
+    edges: u32,
+}
+
+/// Least cosine between the normals where a photon lies and where it is gathered: a disk around a corner or
+/// through a thin wall is none.
+const SAME_SIDE: f32 = 0.5;
+
+impl Photon {
+    #[inline]
+    pub fn of(vertex: &LightVertex) -> Photon {
+        Photon {
+            wi: vertex.hit.wo,
+            ng: vertex.hit.ng,
+            power: vertex.power,
+            edges: vertex.edges,
+        }
+    }
+
+    /// What it brings of the light that leaves `vertex` towards the eye, on paths of at most `max_depth` edges:
+    /// times the density of the kernel, radiance.
+    #[inline]
+    pub(in crate::transport) fn scattered(&self, vertex: &Vertex, max_depth: u32) -> Rgb {
+        let Vertex { hit, shading, .. } = *vertex;
+        if self.edges + vertex.edges > max_depth || self.ng.dot(hit.ng) < SAME_SIDE {
+            return Rgb::BLACK;
+        }
+        let (f_cos, _) = shading.eval_pdf(self.wi, Mode::Radiance);
+        let lit = self.power * f_cos * (1.0 / hit.ng.dot(self.wi).abs());
+        // Light along the surface brings nothing.
+        match lit.is_finite() {
+            true => lit,
+            false => Rgb::BLACK,
+        }
+    }
+}
