@@ -3,12 +3,10 @@
 mod map;
 mod photon;
 mod radius;
-mod shoot;
 
 pub use map::PhotonMap;
 pub use photon::Photon;
 pub use radius::{footprint, reduced};
-pub use shoot::Volley;
 
 /// How photons are shot and gathered.
 #[derive(Clone, Debug, PartialEq)]

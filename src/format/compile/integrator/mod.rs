@@ -9,7 +9,8 @@ use crate::format::{Overrides, Props, SceneError};
 use crate::render::AovLayer;
 use crate::transport::aov::Aov;
 use crate::transport::{
-    BidirSpec, CombinedSpec, DirectSpec, IntegratorSpec, Method, PathSpec, PhotonSpec,
+    BidirSpec, CombinedSpec, DirectSpec, IntegratorSpec, Method, PathSpec, PhotonMapperSpec,
+    PhotonSpec,
 };
 
 const NAMES: [&str; 8] = [
