@@ -1,35 +1,30 @@
 //! Photons that delta lobes alone brought from an emitter, and what they add at a vertex of the eye's walk.
 
 use crate::math::Rgb;
-use crate::scene::Scene;
 use crate::transport::PathStats;
 use crate::transport::light_walk::LightVertex;
 use crate::transport::path::{Gather, Gathered, Vertex};
-use crate::transport::photons::{Photon, PhotonMap};
+use crate::transport::photons::{Kernel, Photon, PhotonMap};
 
-/// The photon to keep at `vertex`, if any.
+/// The photon to keep at `vertex`, which receives photons, if any.
 #[inline]
-pub fn caustic(scene: &Scene, vertex: &LightVertex) -> Option<Photon> {
-    let caustic = vertex.scattered > 0 && vertex.specular && scene.receives(&vertex.hit);
-    caustic.then(|| Photon::of(vertex))
+pub fn caustic(vertex: &LightVertex) -> Option<Photon> {
+    (vertex.scattered > 0 && vertex.specular).then(|| Photon::of(vertex))
 }
 
 /// The caustic photons of one iteration.
 pub struct Caustics {
     pub map: PhotonMap<Photon>,
-    /// One over the number of walks and the area that photons are gathered from.
-    pub density: f32,
+    pub kernel: Kernel,
+    /// One over the number of walks.
+    pub share: f32,
 }
 
 impl Caustics {
     /// Radiance that the photons around `vertex` send towards the eye, on paths of at most `max_depth` edges.
     #[inline]
     pub fn at(&self, vertex: &Vertex, max_depth: u32) -> Rgb {
-        let mut sum = Rgb::BLACK;
-        self.map.within(vertex.hit.p, |photon, _| {
-            sum += photon.scattered(vertex, max_depth);
-        });
-        sum * self.density
+        Photon::gather(&self.map, &self.kernel, vertex, max_depth) * self.share
     }
 }
 

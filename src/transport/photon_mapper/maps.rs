@@ -1,18 +1,20 @@
 //! The two maps, and what they tell of the light at a point.
 
 use super::PhotonMapper;
-use crate::math::{PI, Rgb};
+use crate::math::Rgb;
 use crate::transport::Ledger;
 use crate::transport::combined::caustic;
-use crate::transport::light_walk::LightWalk;
+use crate::transport::light_walk::{LightVertex, LightWalk};
 use crate::transport::mis::Techniques;
 use crate::transport::path::{UNBOUNDED, Vertex};
-use crate::transport::photons::{Photon, PhotonMap, Volley};
+use crate::transport::photons::{Kernel, KernelShape, Photon, PhotonMap, Shoot};
 
-/// Photons and the walks that they are of.
+/// Photons, and how they are gathered.
 struct Map {
     photons: PhotonMap<Photon>,
-    walks: u64,
+    kernel: Kernel,
+    /// One over the number of walks.
+    share: f32,
 }
 
 /// Radiance from photons, and the radius of the disk that they were taken from.
@@ -41,21 +43,11 @@ impl Maps {
 }
 
 impl Map {
-    /// Density estimate with the kernel 3 (1 - d²/r²)² / (π r²), d being the distance (Silverman 1986,
-    /// equation 4.5): smooth, and with the mean 1 over the disk.
     fn at(&self, vertex: &Vertex, max_depth: u32) -> Estimate {
-        let radius = self.photons.radius();
-        let r2 = f64::from(radius).powi(2);
-        let inverse = (1.0 / r2) as f32;
-        let mut sum = Rgb::BLACK;
-        self.photons.within(vertex.hit.p, |photon, d2| {
-            let near = (1.0 - d2 * inverse).max(0.0);
-            sum += photon.scattered(vertex, max_depth) * (near * near);
-        });
-        let scale = 3.0 / (f64::from(PI) * r2 * self.walks.max(1) as f64);
+        let sum = Photon::gather(&self.photons, &self.kernel, vertex, max_depth);
         Estimate {
-            radiance: sum * scale as f32,
-            radius,
+            radiance: sum * self.share,
+            radius: self.photons.radius(),
         }
     }
 }
@@ -64,53 +56,70 @@ impl PhotonMapper<'_> {
     /// The maps of the light that flies at `time`.
     pub fn shoot(&self, number: u64, time: f32, ledger: &mut Ledger) -> Maps {
         let scene = self.setting.scene;
-        let volley = |specular_only, stream| Volley {
+        let max_depth = self.spec.path.max_depth.unwrap_or(UNBOUNDED);
+        let shoot = |specular_only| Shoot {
+            setting: self.setting,
             walk: LightWalk {
                 scene,
                 aim: &self.aim,
                 techniques: Techniques::default(),
                 // One edge is left for the eye.
-                max_edges: self
-                    .spec
-                    .path
-                    .max_depth
-                    .unwrap_or(UNBOUNDED)
-                    .saturating_sub(1),
+                max_edges: max_depth.saturating_sub(1),
                 specular_only,
             },
-            setting: self.setting,
-            stream,
-            number,
+            count: 0,
+            iteration: number,
             time,
         };
         let size = 0.5 * scene.world().bounds().diagonal().length();
-        let map = |(photons, walks), relative: f32| Map {
-            photons: PhotonMap::new(photons, relative * size),
-            walks,
+        let all = Wanted {
+            photons: self.spec.global_photons,
+            radius: self.spec.global_radius * size,
         };
-        let wanted = self.spec.global_photons;
-        let global = volley(false, GLOBAL).shoot_until(wanted, most(wanted), ledger, |vertex| {
-            scene.receives(&vertex.hit).then(|| Photon::of(vertex))
-        });
-        let wanted = self.spec.caustic_photons;
-        let caustics = scene.throws_caustics().is_ok().then(|| {
-            let shot = volley(true, CAUSTIC).shoot_until(wanted, most(wanted), ledger, |vertex| {
-                caustic(scene, vertex)
-            });
-            map(shot, self.spec.caustic_radius)
-        });
+        let caustics = Wanted {
+            photons: self.spec.caustic_photons,
+            radius: self.spec.caustic_radius * size,
+        };
+        let thrown = scene.throws_caustics().is_ok();
         Maps {
-            global: map(global, self.spec.global_radius),
-            caustic: caustics,
+            global: all.collect(shoot(false), ledger, |vertex| Some(Photon::of(vertex))),
+            caustic: thrown.then(|| caustics.collect(shoot(true), ledger, caustic)),
         }
     }
 }
 
-/// Most walks for so many photons: more are not worth their time.
-fn most(photons: u64) -> u64 {
-    photons.saturating_mul(100)
+/// What a map is to hold.
+struct Wanted {
+    photons: u64,
+    radius: f32,
 }
 
-/// Set the numbers of the walks apart.
-const GLOBAL: u64 = 0x676c_6f62_616c_0001;
-const CAUSTIC: u64 = 0x6361_7573_7469_6302;
+impl Wanted {
+    /// Shoots about as many photons: a few walks tell how many it takes.
+    fn collect(
+        &self,
+        shoot: Shoot,
+        ledger: &mut Ledger,
+        store: impl Fn(&LightVertex) -> Option<Photon> + Sync,
+    ) -> Map {
+        let pilot = Shoot {
+            count: PILOT.min(self.photons),
+            ..shoot
+        };
+        let (_, tally) = pilot.trace(ledger, &store);
+        let per_walk = tally.stored as f64 / pilot.count.max(1) as f64;
+        // Where hardly any walk leaves a photon, more walks are not worth their time.
+        let count = (self.photons as f64 / per_walk.max(WORTH)).ceil() as u64;
+        let (photons, _) = Shoot { count, ..shoot }.trace(ledger, store);
+        Map {
+            photons: PhotonMap::new(photons, self.radius),
+            kernel: Kernel::new(KernelShape::Epanechnikov, self.radius),
+            share: 1.0 / count.max(1) as f32,
+        }
+    }
+}
+
+/// Walks that tell how many photons a walk leaves.
+const PILOT: u64 = 1 << 14;
+/// Least photons of a walk that count on.
+const WORTH: f64 = 0.01;

@@ -1,5 +1,6 @@
 //! A photon, and what it brings where it is gathered.
 
+use super::{Kernel, PhotonMap};
 use crate::bsdf::Mode;
 use crate::math::{Rgb, Vec3};
 use crate::transport::light_walk::LightVertex;
@@ -18,10 +19,6 @@ pub struct Photon {
     edges: u32,
 }
 
-/// Least cosine between the normals where a photon lies and where it is gathered: a disk around a corner or
-/// through a thin wall is none.
-const SAME_SIDE: f32 = 0.5;
-
 impl Photon {
     #[inline]
     pub fn of(vertex: &LightVertex) -> Photon {
@@ -36,17 +33,33 @@ impl Photon {
     /// What it brings of the light that leaves `vertex` towards the eye, on paths of at most `max_depth` edges:
     /// times the density of the kernel, radiance.
     #[inline]
-    pub(in crate::transport) fn scattered(&self, vertex: &Vertex, max_depth: u32) -> Rgb {
-        let Vertex { hit, shading, .. } = *vertex;
-        if self.edges + vertex.edges > max_depth || self.ng.dot(hit.ng) < SAME_SIDE {
+    fn scattered(&self, vertex: &Vertex, max_depth: u32) -> Rgb {
+        if self.edges + vertex.edges > max_depth {
             return Rgb::BLACK;
         }
-        let (f_cos, _) = shading.eval_pdf(self.wi, Mode::Radiance);
-        let lit = self.power * f_cos * (1.0 / hit.ng.dot(self.wi).abs());
+        let (f_cos, _) = vertex.shading.eval_pdf(self.wi, Mode::Radiance);
+        let lit = self.power * f_cos * (1.0 / vertex.hit.ng.dot(self.wi).abs());
         // Light along the surface brings nothing.
         match lit.is_finite() {
             true => lit,
             false => Rgb::BLACK,
         }
+    }
+
+    /// Radiance that the photons of `map` around `vertex` send towards the eye, if one walk made them.
+    #[inline]
+    pub(in crate::transport) fn gather(
+        map: &PhotonMap<Photon>,
+        kernel: &Kernel,
+        vertex: &Vertex,
+        max_depth: u32,
+    ) -> Rgb {
+        let mut sum = Rgb::BLACK;
+        map.around(vertex.hit.p, |photon, offset, d2| {
+            if kernel.accepts(vertex.hit, photon.ng, offset) {
+                sum += photon.scattered(vertex, max_depth) * kernel.eval(d2);
+            }
+        });
+        sum
     }
 }
