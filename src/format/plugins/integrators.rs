@@ -89,6 +89,104 @@ const fn integrator(name: &'static str, params: &'static [Param], doc: &'static 
 
 const INT32: (i64, i64) = (0, i32::MAX as i64);
 
+const SAMPLES: (i64, i64) = (0, 1 << 16);
+const PHOTONS: (i64, i64) = (0, 1 << 31);
+const LOOKUP: (i64, i64) = (1, 1 << 20);
+
+const PHOTON_MAPPER: &[Param] = &[
+    Param::int(
+        "direct_samples",
+        (1, 1 << 16),
+        16,
+        "Samples of the emitters where the camera's walk first scatters.",
+    ),
+    Param::int(
+        "gather_samples",
+        SAMPLES,
+        32,
+        "Rays of the final gather from there, where the surface is diffuse; luxel only.",
+    ),
+    Param::int(
+        "glossy_samples",
+        SAMPLES,
+        32,
+        "The same where it is anything else.",
+    ),
+    MAX_DEPTH,
+    RR_DEPTH,
+    Param::int(
+        "global_photons",
+        PHOTONS,
+        250_000,
+        "Photons to keep of all light.",
+    ),
+    Param::int(
+        "caustic_photons",
+        PHOTONS,
+        250_000,
+        "Photons to keep of caustics.",
+    ),
+    Param::float(
+        "global_lookup_radius",
+        Range::Open(0.0, 1e6),
+        0.05,
+        "Most distance that photons of all light are gathered from, relative to the radius of the scene.",
+    ),
+    Param::float(
+        "caustic_lookup_radius",
+        Range::Open(0.0, 1e6),
+        0.0125,
+        "The same for photons of caustics.",
+    ),
+    Param::optional(
+        "lookup_size",
+        Kind::Int(1, 1 << 20),
+        "Sets global_lookup_size and caustic_lookup_size.",
+    ),
+    Param::int(
+        "global_lookup_size",
+        LOOKUP,
+        120,
+        "Photons of all light to gather at once, where as many are near enough.",
+    ),
+    Param::int(
+        "caustic_lookup_size",
+        LOOKUP,
+        120,
+        "The same for photons of caustics.",
+    ),
+    MEMORY,
+    Param::optional(
+        "volume_photons",
+        Kind::Int(0, 1 << 31),
+        "Photons in media, of which luxel has none; without effect on the image.",
+    ),
+    Param::optional(
+        "volume_lookup_size",
+        Kind::Int(0, 1 << 31),
+        "Photons to gather in media; without effect on the image.",
+    ),
+    Param::optional(
+        "granularity",
+        Kind::Int(0, 1 << 31),
+        "Photons per unit of work; without effect on the image.",
+    ),
+    Param::optional(
+        "gather_locally",
+        Kind::Bool,
+        "Where photons are shot; without effect on the image.",
+    ),
+    Param::optional(
+        "auto_cancel_gathering",
+        Kind::Bool,
+        "Give up where hardly a photon is kept; luxel always does.",
+    ),
+    HIDE,
+    PER_PASS,
+    TIMEOUT,
+    BLOCK,
+];
+
 pub const PLUGINS: &[Plugin] = &[
     integrator(
         "path",
@@ -169,6 +267,17 @@ pub const PLUGINS: &[Plugin] = &[
         ],
         "Stochastic progressive photon mapping: all light by photons; biased by their radius, which shrinks.",
     ),
+    Plugin {
+        exclusive: &[
+            ("lookup_size", "global_lookup_size"),
+            ("lookup_size", "caustic_lookup_size"),
+        ],
+        ..integrator(
+            "photonmapper",
+            PHOTON_MAPPER,
+            "Photon maps (Jensen 1996) as in Mitsuba 0.6, the global one behind a final gather; biased by the number of photons.",
+        )
+    },
     Plugin {
         exclusive: &[
             ("shading_samples", "emitter_samples"),

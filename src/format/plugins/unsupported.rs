@@ -162,7 +162,7 @@ const TABLE: &[(Category, &[&str], &str)] = &[
     ),
     (
         Integrator,
-        &["photonmapper", "vpl", "irrcache", "adaptive"],
+        &["vpl", "irrcache", "adaptive"],
         METHOD,
     ),
     (

@@ -11,10 +11,19 @@ use crate::format::plugins::Category;
 use crate::format::{Overrides, Props, SceneError};
 use crate::render::AovLayer;
 use crate::transport::aov::Aov;
-use crate::transport::{CombinedSpec, DirectSpec, IntegratorSpec, PathSpec};
+use crate::transport::{
+    CombinedSpec, DirectSpec, IntegratorSpec, PathSpec, PhotonMapperSpec,
+};
 
-const NAMES: [&str; 7] = [
-    "path", "direct", "bdpt", "ptracer", "vcm", "sppm", "combined",
+const NAMES: [&str; 8] = [
+    "path",
+    "direct",
+    "bdpt",
+    "ptracer",
+    "vcm",
+    "sppm",
+    "combined",
+    "photonmapper",
 ];
 
 pub fn integrator(
@@ -63,6 +72,10 @@ fn unwrap(props: &Props, found: &mut Vec<AovLayer>) -> Result<Option<IntegratorS
             props,
             path(props, hide_emitters)?,
         )?))),
+        "photonmapper" => {
+            let spec = photons::photon_mapper(props, path(props, hide_emitters)?)?;
+            Ok(Some(IntegratorSpec::PhotonMapper(spec)))
+        }
         "direct" => direct(props, hide_emitters).map(Some),
         "bdpt" | "ptracer" | "vcm" | "sppm" => {
             bidir::spec(props, path(props, hide_emitters)?).map(Some)
@@ -133,6 +146,7 @@ fn replaced(mut spec: IntegratorSpec, name: &str) -> Result<IntegratorSpec, Scen
     let mut new = match name {
         "path" => IntegratorSpec::Path(PathSpec::default()),
         "combined" => IntegratorSpec::Combined(CombinedSpec::default()),
+        "photonmapper" => IntegratorSpec::PhotonMapper(PhotonMapperSpec::default()),
         "direct" => IntegratorSpec::Direct(DirectSpec {
             emitter_samples: 1,
             bsdf_samples: 1,
