@@ -87,6 +87,15 @@ impl Sampler {
         }
     }
 
+    /// The numbers of the walk that starts at a light, for the same sample.
+    #[inline]
+    pub fn of_light(self) -> Sampler {
+        Sampler {
+            stream: mix(self.stream ^ 0x6c69_6768_7400_0001),
+            ..self
+        }
+    }
+
     /// Four numbers in [0,1) for the block `dim` (see [`dim`]).
     #[inline]
     pub fn get4(&self, dim: u32) -> [f32; 4] {

@@ -97,7 +97,7 @@ impl Job {
         let start = Instant::now();
         let mut film = self.new_film(stop);
         let mut stats = Stats::default();
-        let transport = self.transport();
+        let transport = self.transport(film.replicates());
         while let Some(n) = next_pass(stop, film.spp(), start.elapsed()) {
             let pass = self.add_pass(&transport, &mut film, n);
             stats.rays += pass.rays;
@@ -111,20 +111,22 @@ impl Job {
     }
 
     /// The integrator, ready to take samples.
-    fn transport(&self) -> Transport<'_> {
+    fn transport(&self, replicates: u32) -> Transport<'_> {
         let setting = Setting {
             scene: &self.scene,
             camera: &self.camera,
             film: &self.film,
             sampler: self.sampler,
             seed: self.seed,
+            replicates,
         };
         Transport::new(&self.integrator, setting)
     }
 
     /// Takes the next `n` samples of every pixel, on all threads of the current pool.
     pub fn add_samples(&self, film: &mut Film, n: u64) -> Stats {
-        self.add_pass(&self.transport(), film, n)
+        let transport = self.transport(film.replicates());
+        self.add_pass(&transport, film, n)
     }
 
     fn add_pass(&self, transport: &Transport, film: &mut Film, n: u64) -> Stats {

@@ -1,6 +1,7 @@
 //! What samples leave behind beside their radiance: counts of rays, light for other pixels, and how much each
 //! technique brought.
 
+use super::light_walk::LightVertex;
 use crate::film::Splat;
 use crate::math::Rgb;
 
@@ -50,6 +51,8 @@ pub struct Ledger {
     pub rays: PathStats,
     /// Light for wherever in the picture it arrives, in the order it was found.
     pub splats: Vec<Splat>,
+    /// Where walks from lights are kept while they are joined with one from the eye.
+    pub(super) light: Vec<LightVertex>,
 }
 
 impl Ledger {

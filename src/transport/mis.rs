@@ -18,6 +18,7 @@
 //! be cut. Whatever the densities are called, the weights of one path sum to one.
 
 use crate::bsdf::Density;
+use crate::light::EmissionPdf;
 
 /// The power heuristic's exponent is 2 (Veach 1997, section 9.2.4).
 #[inline]
@@ -124,6 +125,14 @@ impl State {
 }
 
 impl Leg {
+    /// Sum over all techniques but connecting to the emitter, relative to a walk that arrives at a point where
+    /// light is emitted with the density `pdf`. Straight from there light is not merged.
+    #[inline]
+    pub fn emitted(&self, pdf: &EmissionPdf) -> f64 {
+        let ray = f64::from(pdf.start) * f64::from(pdf.onward) * self.cos;
+        power(ray / (self.onward * f64::from(pdf.cos))) * self.bracket_unmerged
+    }
+
     /// Arrives after the squared distance `dist2` at a surface under the cosine `cos`.
     #[inline]
     pub fn arrive(&self, dist2: f64, cos: f64) -> State {

@@ -1,7 +1,7 @@
-//! The scene, films, reconstruction filters, samplers and integrators.
+//! The scene, films, reconstruction filters and samplers.
 
 use super::super::limits::IMAGE_SIDE;
-use super::{Category, Default, Kind, Param, Plugin, Range, Slot};
+use super::{Category, Kind, Param, Plugin, Range, Slot};
 
 const ANY_NUMBER: usize = usize::MAX;
 const SIDE: (i64, i64) = (1, IMAGE_SIDE);
@@ -35,42 +35,6 @@ const SAMPLES: Param = Param::int(
 const SEED: Param = Param::int("seed", (0, u32::MAX as i64), 0, "Seed of all numbers.");
 const JITTER: Param = Param::bool("jitter", true, "Random position within each stratum.");
 
-const HIDE: Param = Param::bool(
-    "hide_emitters",
-    false,
-    "Leave emitters out of what the camera sees directly.",
-);
-const PER_PASS: Param = Param::optional(
-    "samples_per_pass",
-    Kind::Int(-1, 1 << 31),
-    "Samples per pass; without effect on the image.",
-);
-const TIMEOUT: Param = Param::float(
-    "timeout",
-    Range::Any,
-    -1.0,
-    "Stop after so many seconds; negative: never.",
-);
-const BLOCK: Param = Param::int(
-    "block_size",
-    (0, IMAGE_SIDE),
-    0,
-    "Side of an image tile, 0: chosen by luxel; without effect on the image.",
-);
-const MAX_DEPTH: Param = Param::int(
-    "max_depth",
-    (-1, i32::MAX as i64),
-    -1,
-    "Longest path in edges: 1 shows emitters, 2 adds direct light; -1: no limit.",
-);
-const RR_DEPTH: Param = Param::int(
-    "rr_depth",
-    (1, i32::MAX as i64),
-    5,
-    "Depth from which Russian roulette may end a path.",
-);
-const INTEGRATORS: &[Slot] = &[Slot::new(Category::Integrator, 0, ANY_NUMBER)];
-
 const fn sampler(name: &'static str, params: &'static [Param], doc: &'static str) -> Plugin {
     Plugin::new(Category::Sampler, name, params, doc)
 }
@@ -79,74 +43,7 @@ const fn rfilter(name: &'static str, params: &'static [Param], doc: &'static str
     Plugin::new(Category::Rfilter, name, params, doc)
 }
 
-const fn integrator(name: &'static str, params: &'static [Param], doc: &'static str) -> Plugin {
-    Plugin::new(Category::Integrator, name, params, doc)
-}
-
-const INT32: (i64, i64) = (0, i32::MAX as i64);
-
 pub const PLUGINS: &[Plugin] = &[
-    integrator(
-        "path",
-        &[MAX_DEPTH, RR_DEPTH, HIDE, PER_PASS, TIMEOUT, BLOCK],
-        "Path tracing with next-event estimation and multiple importance sampling.",
-    ),
-    Plugin {
-        exclusive: &[
-            ("shading_samples", "emitter_samples"),
-            ("shading_samples", "bsdf_samples"),
-        ],
-        ..integrator(
-            "direct",
-            &[
-                Param::int(
-                    "shading_samples",
-                    INT32,
-                    1,
-                    "Sets emitter_samples and bsdf_samples.",
-                ),
-                Param::int(
-                    "emitter_samples",
-                    INT32,
-                    1,
-                    "Samples of the emitters per hit.",
-                ),
-                Param::int("bsdf_samples", INT32, 1, "Samples of the BSDF per hit."),
-                HIDE,
-                PER_PASS,
-                TIMEOUT,
-                BLOCK,
-            ],
-            "Direct light by multiple importance sampling.",
-        )
-    },
-    Plugin {
-        slots: INTEGRATORS,
-        ..integrator(
-            "moment",
-            &[HIDE, PER_PASS, TIMEOUT, BLOCK],
-            "The image of the integrators in it, with its second moment.",
-        )
-    },
-    Plugin {
-        slots: INTEGRATORS,
-        ..integrator(
-            "aov",
-            &[
-                Param {
-                    name: "aovs",
-                    kind: Kind::Text,
-                    default: Default::Required,
-                    doc: "Comma-separated name:type; types: albedo depth position uv geo_normal sh_normal prim_index shape_index.",
-                },
-                HIDE,
-                PER_PASS,
-                TIMEOUT,
-                BLOCK,
-            ],
-            "Images of properties of the first hit, beside those of the integrators in it.",
-        )
-    },
     Plugin {
         slots: &[Slot::new(Category::Rfilter, 0, 1)],
         ..Plugin::new(

@@ -7,6 +7,7 @@
 
 mod bsdfs;
 mod cameras;
+mod integrators;
 mod lights;
 mod principled;
 mod reference;
@@ -415,6 +416,7 @@ impl fmt::Display for Plugin {
 /// All rows, by category.
 pub fn all() -> impl Iterator<Item = &'static Plugin> {
     [
+        integrators::PLUGINS,
         cameras::PLUGINS,
         sensors::PLUGINS,
         shapes::PLUGINS,

@@ -1,10 +1,16 @@
 //! Photons: light as it arrives at surfaces, stored to be gathered from the eye's side.
 
+mod kernel;
 mod map;
 mod radius;
+mod shoot;
+mod trace;
 
-pub use map::PhotonMap;
+pub use kernel::{Kernel, KernelShape};
+pub use map::{PhotonMap, RADII};
 pub use radius::{footprint, reduced};
+pub use shoot::Volley;
+pub use trace::{Shoot, Tally};
 
 /// How photons are shot and gathered.
 #[derive(Clone, Debug, PartialEq)]

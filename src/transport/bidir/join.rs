@@ -1,0 +1,260 @@
+//! The ways to join the walks of eye and light.
+
+use super::eye::{EyeWalk, direction};
+use super::{Engine, Photons};
+use crate::bsdf::{Density, Mode};
+use crate::film::Splat;
+use crate::geom::{Endpoint, Hit};
+use crate::material::Shading;
+use crate::math::{Rgb, Vec2, Vec3};
+use crate::sampler::{Sampler, dim};
+use crate::scene::Scene;
+use crate::transport::light_walk::LightVertex;
+use crate::transport::mis::{self, State, Techniques};
+use crate::transport::{Drawn, Ledger, Technique};
+
+/// Light that was scattered at least once, as it arrives at a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Photon {
+    /// Unit direction to where it came from.
+    wi: Vec3,
+    ng: Vec3,
+    /// In W times the number of walks.
+    power: Rgb,
+    /// Edges behind it.
+    edges: u32,
+    /// Weight of the techniques that cut the path just before the photon, and of those before that, over the
+    /// power of the density of going back; relative to merging here.
+    cut: f32,
+    reverse: f32,
+}
+
+impl Photon {
+    /// `merging` as in [`Techniques`].
+    pub fn new(vertex: &LightVertex, merging: f64) -> Photon {
+        let here = mis::power(vertex.state.pdf * merging);
+        Photon {
+            wi: vertex.hit.wo,
+            ng: vertex.hit.ng,
+            power: vertex.power,
+            edges: vertex.edges,
+            cut: ratio(vertex.state.cut, here),
+            reverse: ratio(vertex.state.reverse, here),
+        }
+    }
+}
+
+/// a / b as f32, 0 where a is.
+fn ratio(a: f64, b: f64) -> f32 {
+    match a > 0.0 {
+        true => (a / b).min(f64::from(f32::MAX)) as f32,
+        false => 0.0,
+    }
+}
+
+/// A vertex of the eye's walk that scatters light.
+pub struct EyeVertex {
+    pub hit: Hit,
+    pub shading: Shading,
+    pub u_material: f32,
+    pub state: State,
+    /// From the camera to here.
+    pub edges: u32,
+}
+
+impl EyeVertex {
+    /// Density per steradian with which a walk of light that comes against `wi` goes on towards the eye.
+    #[inline]
+    pub fn pdf_back(&self, scene: &Scene, wi: Vec3) -> f32 {
+        let seen = scene.seen_from(&self.hit, &self.shading, self.u_material, wi);
+        seen.eval_pdf(self.hit.wo, Mode::Importance).1
+    }
+}
+
+/// The numbers that choose the point of the lens that a walk of light is connected to.
+pub fn lens_numbers(sampler: &Sampler) -> Vec2 {
+    let [.., x, y] = sampler.get4(dim::EMISSION);
+    Vec2::new(x, y)
+}
+
+impl Engine<'_> {
+    /// Connects a vertex of light to the camera.
+    pub fn splat(
+        &self,
+        techniques: &Techniques,
+        vertex: &LightVertex,
+        lens: Vec2,
+        ledger: &mut Ledger,
+    ) {
+        let (scene, camera) = (self.setting.scene, self.setting.camera);
+        let Some(passes) = self.max_depth.checked_sub(vertex.edges + 1) else {
+            return;
+        };
+        let hit = &vertex.hit;
+        let margin = self.setting.film.filter.radius();
+        let Some(sight) = camera.connect(hit.p, hit.time, lens, margin) else {
+            return;
+        };
+        let (scattered, back) = vertex.scatter(scene, sight.wi);
+        if scattered.is_black() {
+            return;
+        }
+        ledger.rays.shadow += 1;
+        let seen = scene.transmittance(&hit.spawn_to(&sight.end), passes);
+        if seen == 0.0 {
+            return;
+        }
+        // The density with which the camera would have met the vertex, relative to all walks of light.
+        let cos = f64::from(hit.ng.dot(sight.wi).abs());
+        let met = f64::from(sight.importance) * cos / self.walks;
+        let merging = merging_at(techniques, vertex);
+        let rivals = match techniques.emission {
+            true => mis::power(met) * vertex.state.bracket(f64::from(back), merging),
+            false => 0.0,
+        };
+        let weight = seen * sight.importance / ((1.0 + rivals) * self.walks) as f32;
+        let value = vertex.power * scattered * weight;
+        ledger.record(Technique::Splat, value);
+        ledger.splats.push(Splat {
+            film: sight.film,
+            value,
+        });
+    }
+}
+
+/// What merging at a vertex of light counts for: light straight from an emitter is not merged.
+fn merging_at(techniques: &Techniques, vertex: &LightVertex) -> f64 {
+    match vertex.scattered {
+        0 => 0.0,
+        _ => techniques.merging,
+    }
+}
+
+impl EyeWalk<'_> {
+    /// Light that arrives at `vertex` in all ways but by walking on, scattered towards the eye. `throughput`
+    /// is for the books alone.
+    pub fn join(&self, vertex: &EyeVertex, throughput: Rgb, u: &Drawn, ledger: &mut Ledger) -> Rgb {
+        let mut sum = Rgb::BLACK;
+        let mut add = |technique, lit: Rgb, ledger: &mut Ledger| {
+            ledger.record(technique, throughput * lit);
+            sum += lit;
+        };
+        let lit = self.next_event(vertex, u, ledger);
+        add(Technique::NextEvent, lit, ledger);
+        if self.techniques.connection {
+            let mut lit = Rgb::BLACK;
+            for light in self.light {
+                lit += self.connect(vertex, light, ledger);
+            }
+            add(Technique::Connection, lit, ledger);
+        }
+        if let Some(photons) = self.photons {
+            add(Technique::Merging, self.merge(vertex, photons), ledger);
+        }
+        sum
+    }
+
+    /// Light straight from an emitter.
+    fn next_event(&self, vertex: &EyeVertex, u: &Drawn, ledger: &mut Ledger) -> Rgb {
+        let scene = self.engine.setting.scene;
+        let hit = &vertex.hit;
+        let aim = &self.engine.aim;
+        let Some((light, emitted)) = scene.sample_light_both_ways(aim, hit, u.pick, u.light) else {
+            return Rgb::BLACK;
+        };
+        let (f_cos, pdf) = vertex.shading.eval_pdf(light.wi, Mode::Radiance);
+        if f_cos.is_black() {
+            return Rgb::BLACK;
+        }
+        ledger.rays.shadow += 1;
+        let passes = self.engine.max_depth - vertex.edges - 1;
+        let seen = scene.transmittance(&light.shadow_ray(hit), passes);
+        if seen == 0.0 {
+            return Rgb::BLACK;
+        }
+        let dist2 = f64::from(light.dist).powi(2);
+        let (met, connected) = match light.density {
+            Density::Delta => (0.0, f64::from(emitted.start)),
+            Density::PerSr(density) => (
+                mis::power(f64::from(pdf) / f64::from(density)),
+                f64::from(density) * emitted.start_per_sr(dist2),
+            ),
+        };
+        let cos = f64::from(hit.ng.dot(light.wi).abs());
+        let walked = f64::from(emitted.start) * emitted.arrival(dist2, cos) / connected;
+        let back = f64::from(vertex.pdf_back(scene, light.wi));
+        // Light straight from an emitter is not merged.
+        let rivals = met + mis::power(walked) * vertex.state.bracket(back, 0.0);
+        f_cos * light.weight() * (seen / (1.0 + rivals) as f32)
+    }
+
+    /// Light that arrives from a vertex of light.
+    fn connect(&self, vertex: &EyeVertex, light: &LightVertex, ledger: &mut Ledger) -> Rgb {
+        let scene = self.engine.setting.scene;
+        let edges = vertex.edges + light.edges + 1;
+        let Some(passes) = self.engine.max_depth.checked_sub(edges) else {
+            return Rgb::BLACK;
+        };
+        let (hit, from) = (&vertex.hit, &light.hit);
+        let Some((wi, dist2)) = direction(from.p - hit.p) else {
+            return Rgb::BLACK;
+        };
+        let (f_cos, pdf) = vertex.shading.eval_pdf(wi, Mode::Radiance);
+        if f_cos.is_black() {
+            return Rgb::BLACK;
+        }
+        let (scattered, light_back) = light.scatter(scene, -wi);
+        if scattered.is_black() {
+            return Rgb::BLACK;
+        }
+        let end = Endpoint {
+            p: from.p,
+            p_err: from.p_err,
+            ng: from.ng,
+        };
+        ledger.rays.shadow += 1;
+        let seen = scene.transmittance(&hit.spawn_to(&end), passes);
+        if seen == 0.0 {
+            return Rgb::BLACK;
+        }
+        let cos_here = f64::from(hit.ng.dot(wi).abs());
+        let cos_there = f64::from(from.ng.dot(wi).abs());
+        let (_, light_pdf) = light.shading.eval_pdf(-wi, Mode::Importance);
+        let there = f64::from(pdf) * cos_there / dist2;
+        let here = f64::from(light_pdf) * cos_here / dist2;
+        let back = f64::from(vertex.pdf_back(scene, wi));
+        let merging = merging_at(&self.techniques, light);
+        let rivals = mis::power(there) * light.state.bracket(f64::from(light_back), merging)
+            + mis::power(here) * vertex.state.bracket(back, self.techniques.merging);
+        let weight = f64::from(seen) / (dist2 * (1.0 + rivals));
+        f_cos * light.power * scattered * weight as f32
+    }
+
+    /// Light of the photons around `vertex`.
+    fn merge(&self, vertex: &EyeVertex, photons: &Photons) -> Rgb {
+        let scene = self.engine.setting.scene;
+        let (hit, shading) = (&vertex.hit, &vertex.shading);
+        let here = mis::power(vertex.state.pdf * self.techniques.merging);
+        let mut sum = Rgb::BLACK;
+        photons.map.within(hit.p, |photon, _| {
+            if photon.edges + vertex.edges > self.engine.max_depth
+                || photon.ng.dot(hit.ng) < SAME_SIDE
+            {
+                return;
+            }
+            let (f_cos, pdf) = shading.eval_pdf(photon.wi, Mode::Radiance);
+            if f_cos.is_black() {
+                return;
+            }
+            let back = f64::from(vertex.pdf_back(scene, photon.wi));
+            let behind = photon.cut + pdf * pdf * photon.reverse;
+            let ahead = ratio(vertex.state.sum(back), here);
+            let cos = hit.ng.dot(photon.wi).abs();
+            sum += photon.power * f_cos * (1.0 / (cos * (1.0 + behind + ahead)));
+        });
+        sum * photons.density
+    }
+}
+
+/// Least cosine between the normals where a photon lies and where it is gathered.
+const SAME_SIDE: f32 = 0.5;

@@ -1,0 +1,231 @@
+//! Bidirectional transport: light subpaths, eye subpaths, and all ways to join them.
+//!
+//! One walk of light and one walk of the eye serve bidirectional path tracing (Veach 1997, chapter 10), light
+//! tracing, progressive photon mapping and their union, vertex connection and merging (Georgiev et al. 2012):
+//! they differ in the [`Techniques`] that are switched on. Light that comes straight from an emitter is never
+//! merged: connecting to the emitter finds it without bias.
+
+mod eye;
+mod join;
+
+use super::light_walk::LightWalk;
+use super::mis::Techniques;
+use super::path::UNBOUNDED;
+use super::photons::{self, PhotonMap};
+use super::{Iteration, Ledger, Li, PhotonSpec, Setting};
+use crate::geom::Ray;
+use crate::light::Aim;
+use crate::math::PI;
+use crate::sampler::Sampler;
+use crate::scene::CameraSample;
+use join::Photon;
+
+/// Which techniques are joined.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Bidirectional path tracing.
+    Bdpt,
+    /// Light tracing: light alone walks, and is connected to the camera.
+    Ptracer,
+    /// Vertex connection and merging.
+    Vcm,
+    /// Stochastic progressive photon mapping: photons of light that was scattered are merged at every vertex
+    /// of the eye's walk; light straight from emitters is sampled as a path tracer does.
+    Sppm,
+}
+
+impl Method {
+    pub fn name(self) -> &'static str {
+        match self {
+            Method::Bdpt => "bdpt",
+            Method::Ptracer => "ptracer",
+            Method::Vcm => "vcm",
+            Method::Sppm => "sppm",
+        }
+    }
+
+    /// Whether photons are gathered, which is biased.
+    pub fn merges(self) -> bool {
+        matches!(self, Method::Vcm | Method::Sppm)
+    }
+}
+
+/// Settings of bidirectional methods.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BidirSpec {
+    pub method: Method,
+    /// Most edges of a path; `None`: no limit.
+    pub max_depth: Option<u32>,
+    /// Edges from which on Russian roulette may end the eye's walk.
+    pub rr_depth: u32,
+    pub hide_emitters: bool,
+    pub photons: PhotonSpec,
+}
+
+/// The photons of one iteration.
+pub struct Photons {
+    map: PhotonMap<Photon>,
+    /// One over the number of walks that made the photons and the area that they are gathered from.
+    density: f32,
+    techniques: Techniques,
+}
+
+/// A bidirectional method at work.
+pub struct Engine<'a> {
+    spec: &'a BidirSpec,
+    setting: Setting<'a>,
+    aim: Aim,
+    max_depth: u32,
+    /// Without merging.
+    techniques: Techniques,
+    /// Walks from lights that are connected to the camera, per iteration.
+    walks: f64,
+    photons: u64,
+    radius: f32,
+}
+
+impl<'a> Engine<'a> {
+    pub fn new(spec: &'a BidirSpec, setting: Setting<'a>) -> Engine<'a> {
+        let crop = setting.film.crop;
+        let pixels = u64::from(crop.width) * u64::from(crop.height);
+        let walks = pixels as f64;
+        let splats = match spec.method {
+            Method::Sppm => 0.0,
+            _ if setting.camera.can_be_connected() => walks,
+            _ => 0.0,
+        };
+        let both = matches!(spec.method, Method::Bdpt | Method::Vcm);
+        let techniques = Techniques {
+            emission: spec.method != Method::Ptracer,
+            next_event: spec.method != Method::Ptracer,
+            connection: both,
+            splats,
+            merging: 0.0,
+        };
+        let radius = match spec.photons.radius {
+            _ if !spec.method.merges() => 0.0,
+            Some(radius) => radius,
+            None => RADIUS_IN_PIXELS * photons::footprint(&setting),
+        };
+        Engine {
+            spec,
+            setting,
+            aim: Aim::default(),
+            max_depth: spec.max_depth.unwrap_or(UNBOUNDED),
+            techniques,
+            walks,
+            photons: spec.photons.count.unwrap_or(pixels).max(1),
+            radius,
+        }
+    }
+
+    /// The walk that light takes, with the techniques that its weights know.
+    fn light_walk(&self, techniques: Techniques) -> LightWalk<'_> {
+        LightWalk {
+            scene: self.setting.scene,
+            aim: &self.aim,
+            techniques,
+            // One edge is left for the eye.
+            max_edges: self.max_depth.saturating_sub(1),
+            specular_only: false,
+        }
+    }
+
+    /// Begins an iteration: shoots its photons.
+    pub fn begin(&self, number: u64, ledger: &mut Ledger) -> Iteration {
+        if !self.spec.method.merges() {
+            return Iteration::default();
+        }
+        let time = self.setting.common_time(number);
+        let radius = photons::reduced(self.radius, self.spec.photons.alpha, number);
+        let area = PI * radius * radius;
+        let techniques = Techniques {
+            merging: self.photons as f64 * f64::from(area),
+            ..self.techniques
+        };
+        let walk = self.light_walk(techniques);
+        let mut found = Vec::new();
+        for i in 0..self.photons {
+            let stream = crate::sampler::mix(self.setting.seed ^ PHOTONS);
+            let sampler = Sampler::new(self.setting.sampler, stream, number, i, 1);
+            walk.walk(&sampler, time.unwrap_or(0.0), &mut ledger.rays, |vertex| {
+                if vertex.scattered > 0 && self.setting.scene.receives(&vertex.hit) {
+                    found.push((vertex.hit.p, Photon::new(vertex, techniques.merging)));
+                }
+                true
+            });
+        }
+        Iteration {
+            time,
+            photons: Some(Photons {
+                map: PhotonMap::new(found, radius),
+                density: (1.0 / techniques.merging) as f32,
+                techniques,
+            }),
+            ..Iteration::default()
+        }
+    }
+
+    /// One sample of the radiance along `ray`; light for other pixels goes to the ledger.
+    pub fn sample(
+        &self,
+        iteration: &Iteration,
+        at: &CameraSample,
+        ray: Ray,
+        sampler: &Sampler,
+        ledger: &mut Ledger,
+    ) -> Li {
+        let photons = iteration.photons.as_ref();
+        let techniques = photons.map_or(self.techniques, |p| p.techniques);
+        let mut light = std::mem::take(&mut ledger.light);
+        light.clear();
+        if techniques.splats > 0.0 || techniques.connection {
+            self.light_subpath(techniques, at.time, &sampler.of_light(), ledger, &mut light);
+        }
+        let eye = eye::EyeWalk {
+            engine: self,
+            techniques,
+            photons,
+            light: &light,
+        };
+        let li = match self.spec.method {
+            Method::Ptracer => eye.look(ray, ledger),
+            _ => eye.walk(ray, sampler, ledger),
+        };
+        ledger.light = light;
+        li
+    }
+
+    /// Light walks; what it meets is connected to the camera, and kept for the eye's walk.
+    fn light_subpath(
+        &self,
+        techniques: Techniques,
+        time: f32,
+        sampler: &Sampler,
+        ledger: &mut Ledger,
+        kept: &mut Vec<super::light_walk::LightVertex>,
+    ) {
+        let mut rays = std::mem::take(&mut ledger.rays);
+        let lens = join::lens_numbers(sampler);
+        self.light_walk(techniques)
+            .walk(sampler, time, &mut rays, |vertex| {
+                if vertex.shading.bsdf.is_delta() {
+                    return true;
+                }
+                if techniques.splats > 0.0 {
+                    self.splat(&techniques, vertex, lens, ledger);
+                }
+                if techniques.connection {
+                    kept.push(*vertex);
+                }
+                true
+            });
+        ledger.rays += rays;
+    }
+}
+
+/// Radius of the first iteration's disk in pixels.
+const RADIUS_IN_PIXELS: f32 = 2.0;
+
+/// Sets the numbers of photons apart from those of pixels.
+const PHOTONS: u64 = 0x7068_6f74_6f6e_0001;
