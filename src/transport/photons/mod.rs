@@ -2,11 +2,13 @@
 
 mod kernel;
 mod map;
+mod nearest;
 mod radius;
 mod trace;
 
 pub use kernel::{Kernel, KernelShape};
 pub use map::{PhotonMap, RADII};
+pub use nearest::NearestMap;
 pub use radius::{footprint, reduced};
 pub use trace::{Shoot, Tally};
 
