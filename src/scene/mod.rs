@@ -256,6 +256,31 @@ impl Scene {
         self.material(hit).receives()
     }
 
+    /// Whether light can be thrown onto a surface by delta lobes alone; if not, why.
+    pub fn throws_caustics(&self) -> Result<(), &'static str> {
+        let any = |asks: fn(&Material) -> bool| {
+            let mut used = self
+                .surfaces
+                .iter()
+                .map(|id| &self.materials[id.0 as usize]);
+            used.any(asks)
+        };
+        if !self.has_lights() {
+            Err("there is no emitter")
+        } else if !any(Material::is_specular) {
+            Err("no surface has a delta lobe that reflects or refracts")
+        } else if !any(Material::receives) {
+            Err("no surface has a lobe other than delta ones, that a caustic could be seen on")
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Adds a decision to the plan.
+    pub fn decide(&mut self, entry: PlanEntry) {
+        self.plan.entries.push(entry);
+    }
+
     /// Chooses among the lights by `strategy` from now on: for comparisons, since the one that is chosen by
     /// itself is meant to be the best.
     pub fn choose_lights_by(&mut self, strategy: Strategy) {

@@ -4,6 +4,7 @@
 
 pub mod aov;
 mod bidir;
+mod combined;
 mod ledger;
 pub mod light_walk;
 pub mod mis;
@@ -11,6 +12,7 @@ mod path;
 pub mod photons;
 
 pub use bidir::{BidirSpec, Method};
+pub use combined::{CombinedSpec, Show};
 pub use ledger::{Ledger, PathStats, Technique};
 pub use path::{DirectSpec, PathSpec};
 pub use photons::PhotonSpec;
@@ -21,7 +23,7 @@ use crate::geom::{Hit, Ray};
 use crate::material::Shading;
 use crate::math::{Rgb, Vec2};
 use crate::sampler::{Sampler, SamplerKind, dim};
-use crate::scene::{Camera, CameraSample, Scene};
+use crate::scene::{Camera, CameraSample, PlanEntry, Scene};
 
 /// Which estimator computes the picture, and its settings.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,6 +32,8 @@ pub enum IntegratorSpec {
     Direct(DirectSpec),
     /// Light and eye subpaths, joined.
     Bidirectional(BidirSpec),
+    /// Path tracing, caustics by photons.
+    Combined(CombinedSpec),
 }
 
 impl IntegratorSpec {
@@ -38,6 +42,54 @@ impl IntegratorSpec {
             IntegratorSpec::Path(_) => "path",
             IntegratorSpec::Direct(_) => "direct",
             IntegratorSpec::Bidirectional(spec) => spec.method.name(),
+            IntegratorSpec::Combined(_) => "combined",
+        }
+    }
+
+    /// Whether emitters are left out of the camera's straight look.
+    pub fn hide_emitters(&mut self) -> &mut bool {
+        match self {
+            IntegratorSpec::Path(spec) => &mut spec.hide_emitters,
+            IntegratorSpec::Direct(spec) => &mut spec.hide_emitters,
+            IntegratorSpec::Bidirectional(spec) => &mut spec.hide_emitters,
+            IntegratorSpec::Combined(spec) => &mut spec.path.hide_emitters,
+        }
+    }
+
+    /// Most edges of a path, in estimators that have such a limit.
+    pub fn max_depth(&mut self) -> Option<&mut Option<u32>> {
+        match self {
+            IntegratorSpec::Path(spec) => Some(&mut spec.max_depth),
+            IntegratorSpec::Direct(_) => None,
+            IntegratorSpec::Bidirectional(spec) => Some(&mut spec.max_depth),
+            IntegratorSpec::Combined(spec) => Some(&mut spec.path.max_depth),
+        }
+    }
+
+    /// Edges from which on Russian roulette may end a walk, in estimators that play it.
+    pub fn rr_depth(&mut self) -> Option<&mut u32> {
+        match self {
+            IntegratorSpec::Path(spec) => Some(&mut spec.rr_depth),
+            IntegratorSpec::Direct(_) => None,
+            IntegratorSpec::Bidirectional(spec) => Some(&mut spec.rr_depth),
+            IntegratorSpec::Combined(spec) => Some(&mut spec.path.rr_depth),
+        }
+    }
+
+    /// How photons are shot and gathered, in estimators that do.
+    pub fn photons(&mut self) -> Option<&mut PhotonSpec> {
+        match self {
+            IntegratorSpec::Path(_) | IntegratorSpec::Direct(_) => None,
+            IntegratorSpec::Bidirectional(spec) => Some(&mut spec.photons),
+            IntegratorSpec::Combined(spec) => Some(&mut spec.photons),
+        }
+    }
+
+    /// What the estimator decides on in `scene`, for the plan.
+    pub fn plan(&self, scene: &Scene) -> Option<PlanEntry> {
+        match self {
+            IntegratorSpec::Combined(spec) => Some(spec.plan(scene)),
+            _ => None,
         }
     }
 
@@ -46,6 +98,7 @@ impl IntegratorSpec {
         match self {
             IntegratorSpec::Path(_) | IntegratorSpec::Direct(_) => false,
             IntegratorSpec::Bidirectional(spec) => spec.method.merges(),
+            IntegratorSpec::Combined(spec) => spec.show != Show::AllByPath,
         }
     }
 }
@@ -86,6 +139,7 @@ enum Work<'a> {
     Path(&'a PathSpec),
     Direct(&'a DirectSpec),
     Bidirectional(bidir::Engine<'a>),
+    Combined(combined::Combined<'a>),
 }
 
 /// What all samples of one iteration share. A function of scene, seed and the iteration's number alone.
@@ -94,6 +148,7 @@ pub struct Iteration {
     /// When all light of the iteration travels, where light and eye must agree on it.
     pub time: Option<f32>,
     photons: Option<bidir::Photons>,
+    caustics: Option<combined::Caustics>,
 }
 
 impl<'a> Transport<'a> {
@@ -105,6 +160,10 @@ impl<'a> Transport<'a> {
             IntegratorSpec::Bidirectional(spec) => {
                 Work::Bidirectional(bidir::Engine::new(spec, setting))
             }
+            IntegratorSpec::Combined(spec) => match spec.shoots(setting.scene) {
+                true => Work::Combined(combined::Combined::new(spec, setting)),
+                false => Work::Path(&spec.path),
+            },
         };
         Transport { setting, work }
     }
@@ -114,7 +173,7 @@ impl<'a> Transport<'a> {
     pub fn iterates(&self) -> bool {
         match &self.work {
             Work::Path(_) | Work::Direct(_) => false,
-            Work::Bidirectional(_) => true,
+            Work::Bidirectional(_) | Work::Combined(_) => true,
         }
     }
 
@@ -123,6 +182,7 @@ impl<'a> Transport<'a> {
         match &self.work {
             Work::Path(_) | Work::Direct(_) => Iteration::default(),
             Work::Bidirectional(engine) => engine.begin(number, ledger),
+            Work::Combined(engine) => engine.begin(number, ledger),
         }
     }
 
@@ -142,6 +202,7 @@ impl<'a> Transport<'a> {
             Work::Path(spec) => spec.li(scene, ray, sampler, &mut ledger.rays),
             Work::Direct(spec) => spec.li(scene, ray, sampler, &mut ledger.rays),
             Work::Bidirectional(engine) => engine.sample(iteration, at, ray, sampler, ledger),
+            Work::Combined(engine) => engine.sample(iteration, ray, sampler, ledger),
         }
     }
 }

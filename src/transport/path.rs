@@ -2,6 +2,7 @@
 
 use crate::bsdf::{Bsdf, Density, Mode};
 use crate::geom::{Hit, Ray};
+use crate::material::Shading;
 use crate::math::Rgb;
 use crate::sampler::Sampler;
 use crate::scene::Scene;
@@ -27,6 +28,16 @@ pub struct PathSpec {
     pub hide_emitters: bool,
 }
 
+impl Default for PathSpec {
+    fn default() -> PathSpec {
+        PathSpec {
+            max_depth: None,
+            rr_depth: 5,
+            hide_emitters: false,
+        }
+    }
+}
+
 /// Settings of the direct-light integrator: the light and the BSDF are sampled this often per camera ray.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DirectSpec {
@@ -38,14 +49,14 @@ pub struct DirectSpec {
 /// The last vertex of the walk and how the direction away from it was chosen: what MIS needs when that
 /// direction meets an emitter.
 #[derive(Clone, Copy)]
-struct Departure<'a> {
-    from: &'a Hit,
-    density: Density,
+pub(super) struct Departure {
+    pub from: Hit,
+    pub density: Density,
     /// Light samples per BSDF sample at that vertex.
-    light_per_bsdf: f32,
+    pub light_per_bsdf: f32,
 }
 
-impl Departure<'_> {
+impl Departure {
     fn weight(&self, light_pdf: impl FnOnce() -> f32) -> f32 {
         match self.density {
             Density::Delta => 1.0,
@@ -57,7 +68,12 @@ impl Departure<'_> {
 
 /// Radiance emitted towards the walk by what `ray` met, weighted against next-event estimation.
 #[inline]
-fn emission(scene: &Scene, ray: &Ray, met: Option<&Hit>, departure: Option<Departure>) -> Rgb {
+pub(super) fn emission(
+    scene: &Scene,
+    ray: &Ray,
+    met: Option<&Hit>,
+    departure: Option<&Departure>,
+) -> Rgb {
     let le = match met {
         Some(hit) => scene.le(hit),
         None => scene.le_escaped(ray.d),
@@ -65,8 +81,8 @@ fn emission(scene: &Scene, ray: &Ray, met: Option<&Hit>, departure: Option<Depar
     match departure {
         Some(departure) if !le.is_black() => {
             le * departure.weight(|| match met {
-                Some(hit) => scene.pdf_light(departure.from, hit),
-                None => scene.pdf_light_escaped(departure.from, ray.d),
+                Some(hit) => scene.pdf_light(&departure.from, hit),
+                None => scene.pdf_light_escaped(&departure.from, ray.d),
             })
         }
         _ => le,
@@ -96,31 +112,120 @@ pub(super) fn first_seen(
     }
 }
 
+/// What a walk has found out about light at a vertex by other means than its own.
+pub(super) enum Gathered {
+    /// Nothing: the walk alone finds light.
+    Nothing,
+    /// Radiance that leaves towards the walk, beside what the walk finds itself.
+    Also(Rgb),
+    /// All radiance that lobes other than delta ones send towards the walk: delta lobes alone lead on.
+    Instead(Rgb),
+}
+
+/// A vertex of the walk with a lobe that is not a delta one.
+pub(super) struct Vertex<'a> {
+    pub hit: &'a Hit,
+    pub shading: &'a Shading,
+    /// From the camera to here.
+    pub edges: u32,
+    /// Numbers of the walk; those of this vertex are the block of number `edges - 1`.
+    pub sampler: &'a Sampler,
+    /// What the radiance that leaves here counts for in the picture.
+    pub throughput: Rgb,
+}
+
+/// What a walk gathers at its vertices.
+pub(super) trait Gather {
+    /// Whether caustics are found by other means: light that delta lobes alone bring from an emitter to a
+    /// vertex with another lobe. The walk then leaves them out.
+    const TAKES_CAUSTICS: bool;
+
+    /// Whether the walk leaves out what it finds by itself, to show what is gathered alone.
+    #[inline]
+    fn alone(&self) -> bool {
+        false
+    }
+
+    fn at(&mut self, vertex: &Vertex, stats: &mut PathStats) -> Gathered;
+}
+
+/// No other means than the walk itself.
+pub(super) struct WalkOnly;
+
+impl Gather for WalkOnly {
+    const TAKES_CAUSTICS: bool = false;
+
+    #[inline]
+    fn at(&mut self, _: &Vertex, _: &mut PathStats) -> Gathered {
+        Gathered::Nothing
+    }
+}
+
+/// Where a walk begins.
+pub(super) struct Start {
+    pub ray: Ray,
+    /// Edges before.
+    pub edges: u32,
+    pub throughput: Rgb,
+    /// Squared relative index of refraction that it comes through.
+    pub eta2: f32,
+    /// The vertex that `ray` leaves; `None` for the camera.
+    pub departure: Option<Departure>,
+}
+
+impl Start {
+    pub fn at_camera(ray: Ray) -> Start {
+        Start {
+            ray,
+            edges: 0,
+            throughput: Rgb::WHITE,
+            eta2: 1.0,
+            departure: None,
+        }
+    }
+}
+
 impl PathSpec {
     /// One sample of the radiance along `ray` (Kajiya 1986; MIS as Veach 1997, section 10.3.1).
-    pub fn li(&self, scene: &Scene, mut ray: Ray, sampler: &Sampler, stats: &mut PathStats) -> Li {
+    pub fn li(&self, scene: &Scene, ray: Ray, sampler: &Sampler, stats: &mut PathStats) -> Li {
+        self.walk(scene, Start::at_camera(ray), sampler, stats, &mut WalkOnly)
+    }
+
+    /// The same from `start` on, and with what `gather` adds.
+    #[inline]
+    pub(super) fn walk<G: Gather>(
+        &self,
+        scene: &Scene,
+        start: Start,
+        sampler: &Sampler,
+        stats: &mut PathStats,
+        gather: &mut G,
+    ) -> Li {
         let max_depth = self.max_depth.unwrap_or(UNBOUNDED);
-        let (mut lo, mut throughput) = (Rgb::BLACK, Rgb::WHITE);
+        let mut ray = start.ray;
+        let (mut lo, mut throughput) = (Rgb::BLACK, start.throughput);
         let mut seen = false;
         // Whether the walk is still the camera's straight look: through masks and panes, but not scattered.
         // Hidden emitters are hidden from that look alone.
-        let mut straight = true;
+        let mut straight = start.departure.is_none();
         // Product of the squared relative indices of refraction: takes the compression of radiance in a
         // dense medium out of the roulette's decision.
-        let mut eta2 = 1.0;
-        let mut last: Option<(Hit, Density)> = None;
-        for depth in 0..max_depth {
+        let mut eta2 = start.eta2;
+        // Whether a lobe other than a delta one has scattered the walk.
+        let mut spread = start.departure.is_some_and(|d| d.density != Density::Delta);
+        let mut last = start.departure;
+        for depth in start.edges..max_depth {
             let met = match straight {
                 true => first_seen(scene, ray, self.hide_emitters, stats),
                 false => scene.intersect(&ray),
             };
-            let departure = last.as_ref().map(|(from, density)| Departure {
-                from,
-                density: *density,
-                light_per_bsdf: 1.0,
-            });
-            if !(straight && self.hide_emitters) {
-                let le = emission(scene, &ray, met.as_ref(), departure);
+            let caustic = G::TAKES_CAUSTICS
+                && spread
+                && last
+                    .as_ref()
+                    .is_some_and(|last| last.density == Density::Delta);
+            if !(straight && self.hide_emitters || caustic || gather.alone()) {
+                let le = emission(scene, &ray, met.as_ref(), last.as_ref());
                 seen |= straight && !le.is_black();
                 lo += throughput * le;
             }
@@ -152,15 +257,33 @@ impl PathSpec {
             }
             let any_choice = roulette || scene.lights_are_chosen() || shading.bsdf.has_lobes();
             let u = numbers.draw(any_choice);
+            let mut settled = false;
             if !shading.bsdf.is_delta() && scene.has_lights() {
-                let connect = Connect {
-                    mis: Mis::Power {
-                        bsdf_per_light: 1.0,
-                    },
-                    passes: max_depth - depth - 2,
+                let vertex = Vertex {
+                    hit: &hit,
+                    shading: &shading,
+                    edges: depth + 1,
+                    sampler: &sampler,
+                    throughput,
                 };
-                let lit = direct_light(scene, &hit, &shading, connect, u.pick, u.light, stats);
-                lo += throughput * lit;
+                match gather.at(&vertex, stats) {
+                    Gathered::Nothing => {}
+                    Gathered::Also(found) => lo += throughput * found,
+                    Gathered::Instead(found) => {
+                        lo += throughput * found;
+                        settled = true;
+                    }
+                }
+                if !settled && !gather.alone() {
+                    let connect = Connect {
+                        mis: Mis::Power {
+                            bsdf_per_light: 1.0,
+                        },
+                        passes: max_depth - depth - 2,
+                    };
+                    let lit = direct_light(scene, &hit, &shading, connect, u.pick, u.light, stats);
+                    lo += throughput * lit;
+                }
             }
             // The last edge could only meet an emitter.
             if depth + 2 >= max_depth && !scene.emitters_can_be_met() {
@@ -169,6 +292,12 @@ impl PathSpec {
             let Some(sample) = shading.sample(u.lobe, u.direction, Mode::Radiance) else {
                 break;
             };
+            if sample.density != Density::Delta {
+                if settled {
+                    break;
+                }
+                spread = true;
+            }
             // A pane reflects or lets pass.
             if pane && sample.wi.dot(hit.ng) * hit.wo.dot(hit.ng) > 0.0 {
                 straight = false;
@@ -188,7 +317,11 @@ impl PathSpec {
             }
             ray = hit.spawn(sample.wi);
             stats.indirect += 1;
-            last = Some((hit, sample.density));
+            last = Some(Departure {
+                from: hit,
+                density: sample.density,
+                light_per_bsdf: 1.0,
+            });
         }
         Li { radiance: lo, seen }
     }
@@ -235,13 +368,13 @@ impl DirectSpec {
             let ray = hit.spawn(sample.wi);
             stats.indirect += 1;
             let departure = Departure {
-                from: &hit,
+                from: hit,
                 density: sample.density,
                 light_per_bsdf: n_light / n_bsdf,
             };
             let met = scene.intersect(&ray);
             lo += sample.weight
-                * emission(scene, &ray, met.as_ref(), Some(departure))
+                * emission(scene, &ray, met.as_ref(), Some(&departure))
                 * (1.0 / n_bsdf);
         }
         Li { radiance: lo, seen }

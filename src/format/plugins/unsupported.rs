@@ -152,19 +152,17 @@ const TABLE: &[(Category, &[&str], &str)] = &[
     ),
     (
         Integrator,
-        &[
-            "ptracer",
-            "photonmapper",
-            "ppm",
-            "sppm",
-            "bdpt",
-            "mlt",
-            "pssmlt",
-            "erpt",
-            "vpl",
-            "irrcache",
-            "adaptive",
-        ],
+        &["ppm"],
+        "use the integrator \"sppm\", which shoots photons for every pass and keeps none",
+    ),
+    (
+        Integrator,
+        &["mlt", "pssmlt", "erpt"],
+        "luxel mutates no paths; use the integrator \"bdpt\" or \"vcm\"",
+    ),
+    (
+        Integrator,
+        &["photonmapper", "vpl", "irrcache", "adaptive"],
         METHOD,
     ),
     (

@@ -162,6 +162,7 @@ impl<'a> Engine<'a> {
                 density: (1.0 / techniques.merging) as f32,
                 techniques,
             }),
+            ..Iteration::default()
         }
     }
 

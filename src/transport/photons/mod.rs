@@ -4,12 +4,14 @@ mod kernel;
 mod map;
 mod nearest;
 mod radius;
+mod shoot;
 mod trace;
 
 pub use kernel::{Kernel, KernelShape};
 pub use map::{PhotonMap, RADII};
 pub use nearest::NearestMap;
 pub use radius::{footprint, reduced};
+pub use shoot::Volley;
 pub use trace::{Shoot, Tally};
 
 /// How photons are shot and gathered.

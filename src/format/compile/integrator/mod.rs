@@ -1,16 +1,21 @@
 //! The integrator, and the layers that its wrappers ask for.
 
+mod bidir;
 mod layers;
+mod photons;
+
+pub use bidir::check_camera;
 
 use super::{on_command_line, suggest};
 use crate::format::plugins::Category;
 use crate::format::{Overrides, Props, SceneError};
 use crate::render::AovLayer;
 use crate::transport::aov::Aov;
-use crate::transport::{BidirSpec, DirectSpec, IntegratorSpec, Method, PathSpec, PhotonSpec};
+use crate::transport::{CombinedSpec, DirectSpec, IntegratorSpec, PathSpec};
 
-const NAMES: [&str; 6] = ["path", "direct", "bdpt", "ptracer", "vcm", "sppm"];
-const DEFAULT_RR_DEPTH: u32 = 5;
+const NAMES: [&str; 7] = [
+    "path", "direct", "bdpt", "ptracer", "vcm", "sppm", "combined",
+];
 
 pub fn integrator(
     root: &Props,
@@ -21,32 +26,22 @@ pub fn integrator(
         Some(props) => unwrap(&props, &mut found)?,
         None => None,
     };
-    let spec = spec.unwrap_or(default_path());
+    let spec = spec.unwrap_or(IntegratorSpec::Path(PathSpec::default()));
     let mut spec = match &overrides.integrator {
         Some(name) => replaced(spec, name)?,
         None => spec,
     };
     if let Some(depth) = overrides.max_depth {
-        match &mut spec {
-            IntegratorSpec::Path(path) => path.max_depth = depth_limit(depth),
-            IntegratorSpec::Bidirectional(spec) => spec.max_depth = depth_limit(depth),
-            IntegratorSpec::Direct(_) => {
-                let what = "the integrator \"direct\" has no depth to set";
-                return Err(on_command_line("--max-depth", &depth.to_string(), what)
-                    .with_help("leave --max-depth out, or give --integrator path"));
-            }
-        }
+        let name = spec.name();
+        let Some(limit) = spec.max_depth() else {
+            let what = format!("the integrator \"{name}\" has no depth to set");
+            return Err(on_command_line("--max-depth", &depth.to_string(), what)
+                .with_help("leave --max-depth out, or give --integrator path"));
+        };
+        *limit = depth_limit(depth);
     }
     layers::asked_for(overrides, &mut found)?;
     Ok((spec, found))
-}
-
-fn default_path() -> IntegratorSpec {
-    IntegratorSpec::Path(PathSpec {
-        max_depth: None,
-        rr_depth: DEFAULT_RR_DEPTH,
-        hide_emitters: false,
-    })
 }
 
 fn depth_limit(depth: i64) -> Option<u32> {
@@ -63,12 +58,15 @@ fn unwrap(props: &Props, found: &mut Vec<AovLayer>) -> Result<Option<IntegratorS
     }
     let hide_emitters = props.bool("hide_emitters")?;
     match props.plugin() {
-        "path" => Ok(Some(IntegratorSpec::Path(PathSpec {
-            max_depth: depth_limit(props.int("max_depth")?),
-            rr_depth: props.int("rr_depth")? as u32,
-            hide_emitters,
-        }))),
+        "path" => Ok(Some(IntegratorSpec::Path(path(props, hide_emitters)?))),
+        "combined" => Ok(Some(IntegratorSpec::Combined(photons::combined(
+            props,
+            path(props, hide_emitters)?,
+        )?))),
         "direct" => direct(props, hide_emitters).map(Some),
+        "bdpt" | "ptracer" | "vcm" | "sppm" => {
+            bidir::spec(props, path(props, hide_emitters)?).map(Some)
+        }
         wrapper => {
             if wrapper == "moment" {
                 layers::add(found, "m2", Aov::SecondMoment).map_err(|what| props.error(what))?;
@@ -85,20 +83,21 @@ fn unwrap(props: &Props, found: &mut Vec<AovLayer>) -> Result<Option<IntegratorS
                 }
                 inner = unwrap(child, found)?;
             }
-            if let Some(IntegratorSpec::Path(PathSpec {
-                hide_emitters: hide,
-                ..
-            }))
-            | Some(IntegratorSpec::Direct(DirectSpec {
-                hide_emitters: hide,
-                ..
-            })) = &mut inner
-            {
-                *hide |= hide_emitters;
+            if let Some(inner) = &mut inner {
+                *inner.hide_emitters() |= hide_emitters;
             }
             Ok(inner)
         }
     }
+}
+
+/// The settings of a camera's walk.
+fn path(props: &Props, hide_emitters: bool) -> Result<PathSpec, SceneError> {
+    Ok(PathSpec {
+        max_depth: depth_limit(props.int("max_depth")?),
+        rr_depth: props.int("rr_depth")? as u32,
+        hide_emitters,
+    })
 }
 
 fn direct(props: &Props, hide_emitters: bool) -> Result<IntegratorSpec, SceneError> {
@@ -127,39 +126,36 @@ fn direct(props: &Props, hide_emitters: bool) -> Result<IntegratorSpec, SceneErr
 const MAX_SPLIT: u32 = 1 << 16;
 
 /// The integrator `name` with the settings it shares with `spec`.
-fn replaced(spec: IntegratorSpec, name: &str) -> Result<IntegratorSpec, SceneError> {
-    let hide_emitters = match &spec {
-        IntegratorSpec::Path(p) => p.hide_emitters,
-        IntegratorSpec::Direct(d) => d.hide_emitters,
-        IntegratorSpec::Bidirectional(b) => b.hide_emitters,
-    };
-    let bidirectional = |method| {
-        Ok(IntegratorSpec::Bidirectional(BidirSpec {
-            method,
-            max_depth: None,
-            rr_depth: DEFAULT_RR_DEPTH,
-            hide_emitters,
-            photons: PhotonSpec::default(),
-        }))
-    };
-    match name {
-        _ if name == spec.name() => Ok(spec),
-        "path" => Ok(match default_path() {
-            IntegratorSpec::Path(p) => IntegratorSpec::Path(PathSpec { hide_emitters, ..p }),
-            other => other,
-        }),
-        "bdpt" => bidirectional(Method::Bdpt),
-        "ptracer" => bidirectional(Method::Ptracer),
-        "vcm" => bidirectional(Method::Vcm),
-        "sppm" => bidirectional(Method::Sppm),
-        "direct" => Ok(IntegratorSpec::Direct(DirectSpec {
+fn replaced(mut spec: IntegratorSpec, name: &str) -> Result<IntegratorSpec, SceneError> {
+    if name == spec.name() {
+        return Ok(spec);
+    }
+    let mut new = match name {
+        "path" => IntegratorSpec::Path(PathSpec::default()),
+        "combined" => IntegratorSpec::Combined(CombinedSpec::default()),
+        "direct" => IntegratorSpec::Direct(DirectSpec {
             emitter_samples: 1,
             bsdf_samples: 1,
-            hide_emitters,
-        })),
-        _ => {
-            let what = format!("unknown integrator \"{name}\"");
-            Err(on_command_line("--integrator", name, what).with_help(suggest(name, NAMES)))
-        }
+            hide_emitters: false,
+        }),
+        _ => match bidir::named(name) {
+            Some(spec) => spec,
+            None => {
+                let what = format!("unknown integrator \"{name}\"");
+                let error = on_command_line("--integrator", name, what);
+                return Err(error.with_help(suggest(name, NAMES)));
+            }
+        },
+    };
+    *new.hide_emitters() = *spec.hide_emitters();
+    if let (Some(to), Some(from)) = (new.max_depth(), spec.max_depth()) {
+        *to = *from;
     }
+    if let (Some(to), Some(from)) = (new.rr_depth(), spec.rr_depth()) {
+        *to = *from;
+    }
+    if let (Some(to), Some(from)) = (new.photons(), spec.photons()) {
+        *to = from.clone();
+    }
+    Ok(new)
 }
