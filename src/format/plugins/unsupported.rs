@@ -160,11 +160,7 @@ const TABLE: &[(Category, &[&str], &str)] = &[
         &["mlt", "pssmlt", "erpt"],
         "luxel mutates no paths; use the integrator \"bdpt\" or \"vcm\"",
     ),
-    (
-        Integrator,
-        &["vpl", "irrcache", "adaptive"],
-        METHOD,
-    ),
+    (Integrator, &["vpl", "irrcache", "adaptive"], METHOD),
     (
         Integrator,
         &["depth"],

@@ -11,9 +11,7 @@ use crate::format::plugins::Category;
 use crate::format::{Overrides, Props, SceneError};
 use crate::render::AovLayer;
 use crate::transport::aov::Aov;
-use crate::transport::{
-    CombinedSpec, DirectSpec, IntegratorSpec, PathSpec, PhotonMapperSpec,
-};
+use crate::transport::{CombinedSpec, DirectSpec, IntegratorSpec, PathSpec, PhotonMapperSpec};
 
 const NAMES: [&str; 8] = [
     "path",
