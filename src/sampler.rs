@@ -96,6 +96,17 @@ impl Sampler {
         }
     }
 
+    /// The numbers of part `i` of `n` that the sample is split into from some vertex on: all parts of all
+    /// samples are spread together.
+    #[inline]
+    pub fn of_part(self, i: u32, n: u32) -> Sampler {
+        Sampler {
+            stream: mix(self.stream ^ 0x7061_7274_7300_0001),
+            index: self.index * u64::from(n) + u64::from(i),
+            ..self
+        }
+    }
+
     /// Four numbers in [0,1) for the block `dim` (see [`dim`]).
     #[inline]
     pub fn get4(&self, dim: u32) -> [f32; 4] {

@@ -46,6 +46,28 @@ pub struct LightVertex {
     pub specular: bool,
 }
 
+/// What became of a walk.
+#[derive(Clone, Copy, Debug)]
+pub struct Walked {
+    /// Power that it began with, in W; black where no emitter sent anything.
+    pub emitted: Rgb,
+    /// Power that it ended with. Surfaces absorbed the rest on the way: less than nothing, where chance made up
+    /// for other walks that it ended.
+    pub left: Rgb,
+    pub end: End,
+}
+
+/// How a walk ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// All that was left is absorbed too.
+    Absorbed,
+    /// Light leaves the scene.
+    Escaped,
+    /// Light would go on, but nobody asks for it.
+    Stopped,
+}
+
 /// Light on its way to the next surface.
 struct OnTheWay {
     from: Vec3,
@@ -62,14 +84,14 @@ enum Leg {
 
 impl LightWalk<'_> {
     /// Follows the light that `sampler` starts at `time`, and calls `visit` for each surface that it meets,
-    /// as long as that says to go on. Returns the power emitted.
+    /// as long as that says to go on.
     pub fn walk(
         &self,
         sampler: &Sampler,
         time: f32,
         stats: &mut PathStats,
         mut visit: impl FnMut(&LightVertex) -> bool,
-    ) -> Rgb {
+    ) -> Walked {
         let [pick, aim, ..] = sampler.get4(dim::EMISSION);
         let [x, y, dx, dy] = sampler.get4(dim::EMISSION + 1);
         let numbers = EmissionNumbers {
@@ -80,8 +102,13 @@ impl LightWalk<'_> {
             time,
         };
         let Some(emission) = self.scene.sample_emission(self.aim, &numbers) else {
-            return Rgb::BLACK;
+            return Walked {
+                emitted: Rgb::BLACK,
+                left: Rgb::BLACK,
+                end: End::Absorbed,
+            };
         };
+        let mut end = End::Stopped;
         let mut ray = emission.ray;
         let mut way = OnTheWay {
             from: ray.o,
@@ -93,6 +120,7 @@ impl LightWalk<'_> {
         for depth in 0..self.max_edges {
             stats.photon += 1;
             let Some(hit) = self.scene.intersect(&ray) else {
+                end = End::Escaped;
                 break;
             };
             let independent;
@@ -126,6 +154,7 @@ impl LightWalk<'_> {
             }
             let u = numbers.draw(true);
             let Some(sample) = shading.sample(u.lobe, u.direction, Mode::Importance) else {
+                end = End::Absorbed;
                 break;
             };
             if self.specular_only && sample.density != Density::Delta {
@@ -135,6 +164,7 @@ impl LightWalk<'_> {
             // Power that is lost ends walks instead of weakening them, so that all photons count alike.
             let survival = weight.max_component().min(1.0);
             if u.roulette >= survival {
+                end = End::Absorbed;
                 break;
             }
             way = OnTheWay {
@@ -145,11 +175,19 @@ impl LightWalk<'_> {
                 leg: Leg::Later(self.leave(&vertex, &sample)),
             };
             if way.power.is_black() || !way.power.is_finite() {
+                end = End::Absorbed;
                 break;
             }
             ray = hit.spawn(sample.wi);
         }
-        emission.power
+        Walked {
+            emitted: emission.power,
+            left: match end {
+                End::Absorbed => Rgb::BLACK,
+                End::Escaped | End::Stopped => way.power,
+            },
+            end,
+        }
     }
 
     /// What the power is multiplied with when light goes on along `sample`.

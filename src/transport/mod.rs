@@ -9,13 +9,17 @@ mod ledger;
 pub mod light_walk;
 pub mod mis;
 mod path;
+mod photon_mapper;
 pub mod photons;
 
 pub use bidir::{BidirSpec, Method};
 pub use combined::{CombinedSpec, Show};
-pub use ledger::{Ledger, PathStats, Technique};
+pub use ledger::{Ledger, PathStats, PerTechnique, Technique};
 pub use path::{DirectSpec, PathSpec};
+pub use photon_mapper::PhotonMapperSpec;
 pub use photons::PhotonSpec;
+
+use std::sync::Arc;
 
 use crate::bsdf::Mode;
 use crate::film::FilmSpec;
@@ -34,6 +38,8 @@ pub enum IntegratorSpec {
     Bidirectional(BidirSpec),
     /// Path tracing, caustics by photons.
     Combined(CombinedSpec),
+    /// Photon maps behind a final gather.
+    PhotonMapper(PhotonMapperSpec),
 }
 
 impl IntegratorSpec {
@@ -43,6 +49,7 @@ impl IntegratorSpec {
             IntegratorSpec::Direct(_) => "direct",
             IntegratorSpec::Bidirectional(spec) => spec.method.name(),
             IntegratorSpec::Combined(_) => "combined",
+            IntegratorSpec::PhotonMapper(_) => "photonmapper",
         }
     }
 
@@ -53,6 +60,7 @@ impl IntegratorSpec {
             IntegratorSpec::Direct(spec) => &mut spec.hide_emitters,
             IntegratorSpec::Bidirectional(spec) => &mut spec.hide_emitters,
             IntegratorSpec::Combined(spec) => &mut spec.path.hide_emitters,
+            IntegratorSpec::PhotonMapper(spec) => &mut spec.path.hide_emitters,
         }
     }
 
@@ -63,6 +71,29 @@ impl IntegratorSpec {
             IntegratorSpec::Direct(_) => None,
             IntegratorSpec::Bidirectional(spec) => Some(&mut spec.max_depth),
             IntegratorSpec::Combined(spec) => Some(&mut spec.path.max_depth),
+            IntegratorSpec::PhotonMapper(spec) => Some(&mut spec.path.max_depth),
+        }
+    }
+
+    /// Edges from which on Russian roulette may end a walk, in estimators that play it.
+    pub fn rr_depth(&mut self) -> Option<&mut u32> {
+        match self {
+            IntegratorSpec::Path(spec) => Some(&mut spec.rr_depth),
+            IntegratorSpec::Direct(_) => None,
+            IntegratorSpec::Bidirectional(spec) => Some(&mut spec.rr_depth),
+            IntegratorSpec::Combined(spec) => Some(&mut spec.path.rr_depth),
+            IntegratorSpec::PhotonMapper(spec) => Some(&mut spec.path.rr_depth),
+        }
+    }
+
+    /// How photons are shot and gathered, in estimators that do.
+    pub fn photons(&mut self) -> Option<&mut PhotonSpec> {
+        match self {
+            IntegratorSpec::Path(_)
+            | IntegratorSpec::Direct(_)
+            | IntegratorSpec::PhotonMapper(_) => None,
+            IntegratorSpec::Bidirectional(spec) => Some(&mut spec.photons),
+            IntegratorSpec::Combined(spec) => Some(&mut spec.photons),
         }
     }
 
@@ -70,7 +101,19 @@ impl IntegratorSpec {
     pub fn plan(&self, scene: &Scene) -> Option<PlanEntry> {
         match self {
             IntegratorSpec::Combined(spec) => Some(spec.plan(scene)),
+            IntegratorSpec::PhotonMapper(spec) => Some(spec.plan(scene)),
             _ => None,
+        }
+    }
+
+    /// The techniques whose shares are told apart, where there are several; none for other integrators.
+    pub fn techniques(&self, scene: &Scene) -> &'static [Technique] {
+        match self {
+            IntegratorSpec::Bidirectional(spec) => spec.method.techniques(),
+            IntegratorSpec::Combined(spec) if spec.shoots(scene) => {
+                &[Technique::Path, Technique::Merging]
+            }
+            _ => &[],
         }
     }
 
@@ -80,6 +123,7 @@ impl IntegratorSpec {
             IntegratorSpec::Path(_) | IntegratorSpec::Direct(_) => false,
             IntegratorSpec::Bidirectional(spec) => spec.method.merges(),
             IntegratorSpec::Combined(spec) => spec.show != Show::AllByPath,
+            IntegratorSpec::PhotonMapper(_) => true,
         }
     }
 }
@@ -121,6 +165,7 @@ enum Work<'a> {
     Direct(&'a DirectSpec),
     Bidirectional(bidir::Engine<'a>),
     Combined(combined::Combined<'a>),
+    PhotonMapper(photon_mapper::PhotonMapper<'a>),
 }
 
 /// What all samples of one iteration share. A function of scene, seed and the iteration's number alone.
@@ -130,6 +175,7 @@ pub struct Iteration {
     pub time: Option<f32>,
     photons: Option<bidir::Photons>,
     caustics: Option<combined::Caustics>,
+    maps: Option<Arc<photon_mapper::Maps>>,
 }
 
 impl<'a> Transport<'a> {
@@ -145,6 +191,9 @@ impl<'a> Transport<'a> {
                 true => Work::Combined(combined::Combined::new(spec, setting)),
                 false => Work::Path(&spec.path),
             },
+            IntegratorSpec::PhotonMapper(spec) => {
+                Work::PhotonMapper(photon_mapper::PhotonMapper::new(spec, setting))
+            }
         };
         Transport { setting, work }
     }
@@ -155,6 +204,17 @@ impl<'a> Transport<'a> {
         match &self.work {
             Work::Path(_) | Work::Direct(_) => false,
             Work::Bidirectional(_) | Work::Combined(_) => true,
+            Work::PhotonMapper(engine) => engine.iterates(),
+        }
+    }
+
+    /// Radius of the disk that photons of iteration `number` are gathered from, in scene units: what blurs the
+    /// picture. `None` where none are, or where it differs from place to place.
+    pub fn radius(&self, number: u64) -> Option<f32> {
+        match &self.work {
+            Work::Bidirectional(engine) => Some(engine.radius(number)).filter(|r| *r > 0.0),
+            Work::Combined(engine) => Some(engine.radius(number)),
+            Work::Path(_) | Work::Direct(_) | Work::PhotonMapper(_) => None,
         }
     }
 
@@ -164,6 +224,7 @@ impl<'a> Transport<'a> {
             Work::Path(_) | Work::Direct(_) => Iteration::default(),
             Work::Bidirectional(engine) => engine.begin(number, ledger),
             Work::Combined(engine) => engine.begin(number, ledger),
+            Work::PhotonMapper(engine) => engine.begin(number, ledger),
         }
     }
 
@@ -184,6 +245,7 @@ impl<'a> Transport<'a> {
             Work::Direct(spec) => spec.li(scene, ray, sampler, &mut ledger.rays),
             Work::Bidirectional(engine) => engine.sample(iteration, at, ray, sampler, ledger),
             Work::Combined(engine) => engine.sample(iteration, ray, sampler, ledger),
+            Work::PhotonMapper(engine) => engine.sample(iteration, ray, sampler, ledger),
         }
     }
 }

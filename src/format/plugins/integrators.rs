@@ -42,10 +42,10 @@ const PHOTON_COUNT: Param = Param::optional(
     Kind::Int(1, 1 << 31),
     "Walks of light per iteration, that is per sample of each pixel; without it, as many as the image has pixels.",
 );
-const RADIUS: Param = Param::optional(
-    "radius",
-    Kind::Float(Range::Positive),
-    "Radius that photons are gathered from in the first iteration, in scene units; without it, two pixels as the camera sees the scene.",
+const INITIAL_RADIUS: Param = Param::optional(
+    "initial_radius",
+    Kind::Float(Range::NonNegative),
+    "Radius that photons are gathered from in the first iteration, in scene units; without it or 0, two pixels as the camera sees the scene.",
 );
 const ALPHA: Param = Param::float(
     "alpha",
@@ -59,6 +59,28 @@ const MEMORY: Param = Param::int(
     4096,
     "Most memory for photons, in MiB.",
 );
+const MAX_PASSES: Param = Param::int(
+    "max_passes",
+    (-1, i32::MAX as i64),
+    -1,
+    "Only -1: a pass is a sample of each pixel, and the sampler or the command line says how many.",
+);
+const GRANULARITY: Param = Param::int(
+    "granularity",
+    (0, i32::MAX as i64),
+    0,
+    "How work is divided; without effect on the image.",
+);
+const LIGHT_IMAGE: Param = Param::bool(
+    "light_image",
+    true,
+    "Connect walks of light to the camera too, where the sensor can be connected to; only true.",
+);
+const SAMPLE_DIRECT: Param = Param::bool(
+    "sample_direct",
+    true,
+    "Connect vertices to emitters by points made for them; only true.",
+);
 const INTEGRATORS: &[Slot] = &[Slot::new(Category::Integrator, 0, usize::MAX)];
 
 const fn integrator(name: &'static str, params: &'static [Param], doc: &'static str) -> Plugin {
@@ -66,6 +88,104 @@ const fn integrator(name: &'static str, params: &'static [Param], doc: &'static 
 }
 
 const INT32: (i64, i64) = (0, i32::MAX as i64);
+
+const SAMPLES: (i64, i64) = (0, 1 << 16);
+const PHOTONS: (i64, i64) = (0, 1 << 31);
+const LOOKUP: (i64, i64) = (1, 1 << 20);
+
+const PHOTON_MAPPER: &[Param] = &[
+    Param::int(
+        "direct_samples",
+        (1, 1 << 16),
+        16,
+        "Samples of the emitters where the camera's walk first scatters.",
+    ),
+    Param::int(
+        "gather_samples",
+        SAMPLES,
+        32,
+        "Rays of the final gather from there, where the surface is diffuse; luxel only.",
+    ),
+    Param::int(
+        "glossy_samples",
+        SAMPLES,
+        32,
+        "The same where it is anything else.",
+    ),
+    MAX_DEPTH,
+    RR_DEPTH,
+    Param::int(
+        "global_photons",
+        PHOTONS,
+        250_000,
+        "Photons to keep of all light.",
+    ),
+    Param::int(
+        "caustic_photons",
+        PHOTONS,
+        250_000,
+        "Photons to keep of caustics.",
+    ),
+    Param::float(
+        "global_lookup_radius",
+        Range::Open(0.0, 1e6),
+        0.05,
+        "Most distance that photons of all light are gathered from, relative to the radius of the scene.",
+    ),
+    Param::float(
+        "caustic_lookup_radius",
+        Range::Open(0.0, 1e6),
+        0.0125,
+        "The same for photons of caustics.",
+    ),
+    Param::optional(
+        "lookup_size",
+        Kind::Int(1, 1 << 20),
+        "Sets global_lookup_size and caustic_lookup_size.",
+    ),
+    Param::int(
+        "global_lookup_size",
+        LOOKUP,
+        120,
+        "Photons of all light to gather at once, where as many are near enough.",
+    ),
+    Param::int(
+        "caustic_lookup_size",
+        LOOKUP,
+        120,
+        "The same for photons of caustics.",
+    ),
+    MEMORY,
+    Param::optional(
+        "volume_photons",
+        Kind::Int(0, 1 << 31),
+        "Photons in media, of which luxel has none; without effect on the image.",
+    ),
+    Param::optional(
+        "volume_lookup_size",
+        Kind::Int(0, 1 << 31),
+        "Photons to gather in media; without effect on the image.",
+    ),
+    Param::optional(
+        "granularity",
+        Kind::Int(0, 1 << 31),
+        "Photons per unit of work; without effect on the image.",
+    ),
+    Param::optional(
+        "gather_locally",
+        Kind::Bool,
+        "Where photons are shot; without effect on the image.",
+    ),
+    Param::optional(
+        "auto_cancel_gathering",
+        Kind::Bool,
+        "Give up where hardly a photon is kept; luxel always does.",
+    ),
+    HIDE,
+    PER_PASS,
+    TIMEOUT,
+    BLOCK,
+];
 
 pub const PLUGINS: &[Plugin] = &[
     integrator(
@@ -85,7 +205,7 @@ pub const PLUGINS: &[Plugin] = &[
             RR_DEPTH,
             HIDE,
             PHOTON_COUNT,
-            RADIUS,
+            INITIAL_RADIUS,
             ALPHA,
             MEMORY,
             PER_PASS,
@@ -94,6 +214,70 @@ pub const PLUGINS: &[Plugin] = &[
         ],
         "Path tracing that leaves caustics to photons; biased by their radius, which shrinks; luxel only.",
     ),
+    integrator(
+        "bdpt",
+        &[
+            MAX_DEPTH,
+            RR_DEPTH,
+            HIDE,
+            LIGHT_IMAGE,
+            SAMPLE_DIRECT,
+            PER_PASS,
+            TIMEOUT,
+            BLOCK,
+        ],
+        "Bidirectional path tracing: walks from the eye and from lights, connected in all ways.",
+    ),
+    integrator(
+        "ptracer",
+        &[MAX_DEPTH, RR_DEPTH, HIDE, PER_PASS, TIMEOUT, BLOCK],
+        "Light tracing: walks from lights alone, connected to the camera.",
+    ),
+    integrator(
+        "vcm",
+        &[
+            MAX_DEPTH,
+            RR_DEPTH,
+            HIDE,
+            PHOTON_COUNT,
+            INITIAL_RADIUS,
+            ALPHA,
+            MEMORY,
+            PER_PASS,
+            TIMEOUT,
+            BLOCK,
+        ],
+        "Vertex connection and merging: bidirectional path tracing and photons together; biased by the photons' radius, which shrinks; luxel only.",
+    ),
+    integrator(
+        "sppm",
+        &[
+            MAX_DEPTH,
+            RR_DEPTH,
+            HIDE,
+            PHOTON_COUNT,
+            INITIAL_RADIUS,
+            ALPHA,
+            MEMORY,
+            MAX_PASSES,
+            GRANULARITY,
+            PER_PASS,
+            TIMEOUT,
+            BLOCK,
+        ],
+        "Stochastic progressive photon mapping: all light by photons; biased by their radius, which shrinks.",
+    ),
+    Plugin {
+        exclusive: &[
+            ("lookup_size", "global_lookup_size"),
+            ("lookup_size", "caustic_lookup_size"),
+        ],
+        ..integrator(
+            "photonmapper",
+            PHOTON_MAPPER,
+            "Photon maps (Jensen 1996) as in Mitsuba 0.6, the global one behind a final gather; biased by the number of photons.",
+        )
+    },
     Plugin {
         exclusive: &[
             ("shading_samples", "emitter_samples"),

@@ -19,19 +19,18 @@
 
 mod caustics;
 
-pub(super) use caustics::Caustics;
+pub(super) use caustics::{Caustics, caustic};
 
 use super::light_walk::LightWalk;
 use super::mis::Techniques;
 use super::path::{Start, UNBOUNDED};
-use super::photons::{self, PhotonMap, Volley};
+use super::photons::{self, Kernel, KernelShape, PhotonMap, Shoot};
 use super::{Iteration, Ledger, Li, PathSpec, PhotonSpec, Setting, Technique};
 use crate::geom::Ray;
 use crate::light::Aim;
-use crate::math::PI;
 use crate::sampler::Sampler;
 use crate::scene::{PlanEntry, Scene};
-use caustics::{CausticPhoton, Gathering};
+use caustics::Gathering;
 
 /// Who finds caustics, and what else is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -126,6 +125,11 @@ impl<'a> Combined<'a> {
         }
     }
 
+    /// Of the disk that photons of iteration `number` are gathered from.
+    pub fn radius(&self, number: u64) -> f32 {
+        photons::reduced(self.radius, self.spec.photons.alpha, number)
+    }
+
     /// Shoots the photons of iteration `number`.
     pub fn begin(&self, number: u64, ledger: &mut Ledger) -> Iteration {
         let time = self.setting.common_time(number);
@@ -135,8 +139,9 @@ impl<'a> Combined<'a> {
                 ..Iteration::default()
             };
         }
-        let radius = photons::reduced(self.radius, self.spec.photons.alpha, number);
-        let volley = Volley {
+        let radius = self.radius(number);
+        let shoot = Shoot {
+            setting: self.setting,
             walk: LightWalk {
                 scene: self.setting.scene,
                 aim: &self.aim,
@@ -145,21 +150,17 @@ impl<'a> Combined<'a> {
                 max_edges: self.spec.path.max_depth.unwrap_or(UNBOUNDED) - 1,
                 specular_only: true,
             },
-            setting: self.setting,
-            stream: PHOTONS,
-            number,
+            count: self.count,
+            iteration: number,
             time: time.unwrap_or(0.0),
         };
-        let found = volley.shoot(self.count, ledger, |vertex| {
-            CausticPhoton::of(self.setting.scene, vertex)
-        });
-        let map = ledger.build_map(|| PhotonMap::new(found, radius));
-        let area = f64::from(PI) * f64::from(map.radius()).powi(2);
+        let (photons, _) = shoot.trace(ledger, caustic);
         Iteration {
             time,
             caustics: Some(Caustics {
-                map,
-                density: (1.0 / (area * self.count.max(1) as f64)) as f32,
+                map: ledger.build_map(|| PhotonMap::new(photons, radius)),
+                kernel: Kernel::new(KernelShape::Epanechnikov, radius),
+                share: 1.0 / self.count.max(1) as f32,
             }),
             ..Iteration::default()
         }
@@ -191,6 +192,3 @@ impl<'a> Combined<'a> {
 
 /// Radius of the first iteration's disk in pixels.
 const RADIUS_IN_PIXELS: f32 = 2.0;
-
-/// Sets the numbers of photons apart from those of pixels.
-const PHOTONS: u64 = 0x6361_7573_7469_6301;

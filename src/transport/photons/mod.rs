@@ -2,13 +2,17 @@
 
 mod kernel;
 mod map;
+mod nearest;
+mod photon;
 mod radius;
-mod shoot;
+mod trace;
 
 pub use kernel::{Kernel, KernelShape};
 pub use map::{PhotonMap, RADII};
+pub use nearest::NearestMap;
+pub use photon::Photon;
 pub use radius::{footprint, reduced};
-pub use shoot::Volley;
+pub use trace::{Shoot, Tally};
 
 /// How photons are shot and gathered.
 #[derive(Clone, Debug, PartialEq)]

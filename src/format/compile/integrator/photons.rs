@@ -1,7 +1,7 @@
 //! Integrators that shoot photons.
 
 use crate::format::{Props, SceneError};
-use crate::transport::{CombinedSpec, PathSpec, PhotonSpec, Show};
+use crate::transport::{CombinedSpec, PathSpec, PhotonMapperSpec, PhotonSpec, Show};
 
 /// Bytes of what memory is asked for in.
 const MIB: u64 = 1 << 20;
@@ -14,8 +14,8 @@ pub fn spec(props: &Props) -> Result<PhotonSpec, SceneError> {
             true => Some(props.int("photon_count")? as u64),
             false => None,
         },
-        radius: match given("radius") {
-            true => Some(props.float("radius")? as f32),
+        radius: match given("initial_radius") {
+            true => Some(props.float("initial_radius")? as f32).filter(|r| *r > 0.0),
             false => None,
         },
         alpha: props.float("alpha")? as f32,
@@ -31,5 +31,36 @@ pub fn combined(props: &Props, path: PathSpec) -> Result<CombinedSpec, SceneErro
             true => Show::All,
             false => Show::AllByPath,
         },
+    })
+}
+
+pub fn photon_mapper(props: &Props, path: PathSpec) -> Result<PhotonMapperSpec, SceneError> {
+    // There is no volume to shoot photons into, and how the work is divided changes nothing in the picture.
+    props.ignore(&[
+        "volume_photons",
+        "volume_lookup_size",
+        "granularity",
+        "gather_locally",
+        "auto_cancel_gathering",
+    ]);
+    let count = |name: &str| Ok::<u32, SceneError>(props.int(name)? as u32);
+    let lookup = match props.is_given("lookup_size") {
+        true => Some(count("lookup_size")?),
+        false => None,
+    };
+    let lookup = |name: &str| lookup.map_or_else(|| count(name), Ok);
+    let direct_samples = count("direct_samples")?;
+    Ok(PhotonMapperSpec {
+        path,
+        direct_samples,
+        gather_samples: count("gather_samples")?,
+        glossy_samples: count("glossy_samples")?,
+        global_photons: props.int("global_photons")? as u64,
+        caustic_photons: props.int("caustic_photons")? as u64,
+        global_radius: props.float("global_lookup_radius")? as f32,
+        caustic_radius: props.float("caustic_lookup_radius")? as f32,
+        global_lookup: lookup("global_lookup_size")?,
+        caustic_lookup: lookup("caustic_lookup_size")?,
+        memory: props.int("memory")? as u64 * MIB,
     })
 }
