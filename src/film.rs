@@ -7,7 +7,7 @@ mod splat;
 
 pub use estimate::{ErrorEstimate, student_t_95};
 pub use filter::{Filter, FilterSampler};
-pub use splat::{Splat, SplatBuffer};
+pub use splat::{Splat, SplatBand, SplatBuffer};
 
 use crate::math::Rgb;
 

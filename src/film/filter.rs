@@ -37,6 +37,28 @@ impl Filter {
         }
     }
 
+    /// Integral of [`Filter::eval`] over its support, by the midpoint rule that the sampler is built on, in
+    /// pixels. Above 0.
+    pub fn integral(&self) -> f64 {
+        if let Filter::Box { radius } = *self {
+            return 2.0 * f64::from(radius);
+        }
+        let width = 2.0 * self.radius() / CELLS as f32;
+        (0..CELLS).map(|i| self.at_cell(i)).sum::<f64>() * f64::from(width)
+    }
+
+    /// Largest magnitude of [`Filter::eval`].
+    pub fn peak(&self) -> f64 {
+        let cells = (0..CELLS).map(|i| self.at_cell(i).abs());
+        cells.fold(f64::from(self.eval(0.0)).abs(), f64::max)
+    }
+
+    /// Value in the middle of cell `i`.
+    fn at_cell(&self, i: usize) -> f64 {
+        let width = 2.0 * self.radius() / CELLS as f32;
+        f64::from(self.eval(-self.radius() + (i as f32 + 0.5) * width))
+    }
+
     /// Value of the one-dimensional filter at distance `x`, not normalised.
     pub fn eval(&self, x: f32) -> f32 {
         let x = x.abs();
@@ -101,8 +123,7 @@ impl FilterSampler {
             return FilterSampler::Box(radius);
         }
         let radius = filter.radius();
-        let width = 2.0 * radius / CELLS as f32;
-        let value = |i: usize| f64::from(filter.eval(-radius + (i as f32 + 0.5) * width));
+        let value = |i: usize| filter.at_cell(i);
         let absolute: f64 = (0..CELLS).map(|i| value(i).abs()).sum();
         let signed: f64 = (0..CELLS).map(value).sum();
         let mut sum = 0.0;

@@ -1,13 +1,21 @@
 //! From a list of emitters to the lights of a scene.
 
 use super::choice::{Choice, Strategy};
+use super::emission::{Cover, Sources};
 use super::far::Far;
 use super::local::{self, Part};
 use super::tree::LightBounds;
 use super::{Emitter, Item, Lights, NO_ITEM, Radiance, Surface, What};
 use super::{moving, textured};
-use crate::geom::{Geometry, ShapeId, World};
+use crate::geom::{Geometry, PlaceId, ShapeId, World};
 use crate::math::{Aabb, Motion, PI, Rgb, Vec3};
+
+/// By shape, where it stands: empty where all stand as they are.
+#[derive(Default)]
+struct Standing {
+    motions: Vec<Option<Motion>>,
+    places: Vec<PlaceId>,
+}
 
 impl Lights {
     /// Emitters that are black or name a shape that is not there are left out.
@@ -16,27 +24,31 @@ impl Lights {
     }
 
     pub fn with_strategy(emitters: Vec<Emitter>, geoms: &[Geometry], strategy: Strategy) -> Lights {
-        Lights::build(emitters, geoms, Vec::new(), around(&all(geoms)), strategy)
+        let still = Standing::default();
+        Lights::build(emitters, geoms, still, &all(geoms), strategy)
     }
 
     /// The same for the shapes of `world`, where an emitter may be in a group that one placement moves.
     /// What changes its form shines, but no connection is made to it.
     pub fn in_world(emitters: Vec<Emitter>, world: &World, strategy: Strategy) -> Lights {
-        let shapes = (0..world.geometries().len() as u32).map(ShapeId);
+        let shapes = || (0..world.geometries().len() as u32).map(ShapeId);
         let geoms = world.geometries();
         if world.places().is_empty() {
             return Lights::with_strategy(emitters, geoms, strategy);
         }
         let motion = |shape| world.placement_of(shape).map(|p| p.motion.clone());
-        let motions = shapes.map(motion).collect();
-        Lights::build(emitters, geoms, motions, around(&world.bounds()), strategy)
+        let standing = Standing {
+            motions: shapes().map(motion).collect(),
+            places: shapes().map(|shape| world.place_of(shape)).collect(),
+        };
+        Lights::build(emitters, geoms, standing, &world.bounds(), strategy)
     }
 
     fn build(
         emitters: Vec<Emitter>,
         geoms: &[Geometry],
-        motions: Vec<Option<Motion>>,
-        radius: f64,
+        standing: Standing,
+        around: &Aabb,
         strategy: Strategy,
     ) -> Lights {
         let mut lights = Lights {
@@ -47,7 +59,8 @@ impl Lights {
             far: Far::default(),
             surfaces: vec![None; geoms.len()],
             item_of: Vec::new(),
-            motions,
+            motions: standing.motions,
+            sources: Sources::default(),
         };
         let mut bounds = Vec::new();
         let mut far = Vec::new();
@@ -57,10 +70,12 @@ impl Lights {
         if !far.is_empty() {
             let near = bounds.iter().map(|b| f64::from(b.power)).sum();
             let near = (!bounds.is_empty()).then_some(near);
-            lights.far = Far::new(&emitters, far, near, radius);
+            lights.far = Far::new(&emitters, far, near, radius_of(around));
         }
         lights.emitters = emitters;
         lights.choice = Choice::new(strategy, &bounds);
+        let powers = bounds.iter().map(|b| b.power);
+        lights.sources = Sources::new(&lights, powers, standing.places, Cover::new(around));
         lights
     }
 
@@ -206,7 +221,7 @@ fn all(geoms: &[Geometry]) -> Aabb {
 }
 
 /// Radius of a sphere around the scene.
-fn around(bounds: &Aabb) -> f64 {
+fn radius_of(bounds: &Aabb) -> f64 {
     match bounds.is_empty() {
         true => 0.0,
         false => 0.5 * bounds.diagonal().as_dvec3().length(),

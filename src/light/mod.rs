@@ -73,6 +73,28 @@ impl Emitter {
             | Emitter::Directional { .. } => false,
         }
     }
+
+    /// Where it stands, if it has no extent.
+    #[inline]
+    fn standpoint(&self) -> Option<Vec3> {
+        match self {
+            Emitter::Point { p, .. } => Some(*p),
+            Emitter::Spot(spot) => Some(spot.position()),
+            Emitter::Projector(projector) => Some(projector.position()),
+            _ => None,
+        }
+    }
+
+    /// Of what has no extent, in W/sr along the unit vector `w`.
+    #[inline]
+    fn intensity(&self, w: Vec3) -> Rgb {
+        match self {
+            Emitter::Point { intensity, .. } => *intensity,
+            Emitter::Spot(spot) => spot.intensity(w),
+            Emitter::Projector(projector) => projector.intensity(w),
+            _ => Rgb::BLACK,
+        }
+    }
 }
 
 /// Index of an emitter in the list given to [`Lights::new`].
@@ -157,6 +179,8 @@ pub struct Lights {
     item_of: Vec<u32>,
     /// By shape: of surfaces that move, from their own coordinates to the world. Empty where none does.
     motions: Vec<Option<Motion>>,
+    /// Where light starts.
+    sources: emission::Sources,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -300,9 +324,21 @@ impl Lights {
         share: f32,
     ) -> Option<EmitterSample> {
         let (index, prob) = self.choice.pick(from, u_pick)?;
+        self.sample_item(geoms, from, index, prob * share, u)
+    }
+
+    /// A connection to the item `index`, chosen with probability `prob`.
+    #[inline]
+    fn sample_item(
+        &self,
+        geoms: &[Geometry],
+        from: &Hit,
+        index: usize,
+        prob: f32,
+        u: Vec2,
+    ) -> Option<EmitterSample> {
         let item = self.items.get(index)?;
         let emitter = EmitterId(item.emitter);
-        let prob = prob * share;
         if let Some(moved) = self.moved(&item.what, from) {
             return self.sample_moved(geoms, item, &moved, from.p, u, prob);
         }
@@ -334,26 +370,15 @@ impl Lights {
     /// A connection to an emitter that stands at a point.
     fn sample_point(&self, emitter: u32, from: &Hit, prob: f32) -> Option<EmitterSample> {
         let light = self.emitters.get(emitter as usize)?;
-        let p = match light {
-            Emitter::Point { p, .. } => *p,
-            Emitter::Spot(spot) => spot.position(),
-            Emitter::Projector(projector) => projector.position(),
-            _ => return None,
-        };
+        let p = light.standpoint()?;
         let d = (p - from.p).as_dvec3();
         let wi = d.try_normalize()?.as_vec3();
-        let intensity = match light {
-            Emitter::Point { intensity, .. } => *intensity,
-            Emitter::Spot(spot) => spot.intensity(-wi),
-            Emitter::Projector(projector) => projector.intensity(-wi),
-            _ => return None,
-        };
         let end = Endpoint {
             p,
             p_err: Vec3::ZERO,
             ng: Vec3::ZERO,
         };
-        let le = intensity * (1.0 / (d.length_squared() * prob as f64)) as f32;
+        let le = light.intensity(-wi) * (1.0 / (d.length_squared() * prob as f64)) as f32;
         delta(wi, d.length() as f32, end, le, EmitterId(emitter))
     }
 
@@ -371,23 +396,27 @@ impl Lights {
     /// Density per steradian at `from` with which [`Lights::sample`] connects to the point `met` of an
     /// emitting surface; 0 when it is none.
     pub fn pdf(&self, geoms: &[Geometry], from: &Hit, met: &Hit) -> f32 {
-        let Some(Some(surface)) = self.surfaces.get(met.shape.0 as usize) else {
-            return 0.0;
-        };
-        let index = self.item_of.get((surface.first + met.prim) as usize);
-        let Some(&index) = index.filter(|&&i| i != NO_ITEM) else {
+        let Some(index) = self.item_at(met) else {
             return 0.0;
         };
         let Some(g) = geoms.get(met.shape.0 as usize) else {
             return 0.0;
         };
-        let what = &self.items[index as usize].what;
+        let what = &self.items[index].what;
         let pdf = match self.moved(what, from) {
             Some(moved) => self.pdf_moved(g, what, &moved, from.p, met),
             None => self.pdf_of(g, what, from.p, (met.p, met.ng, &place_of(met))),
         };
-        let prob = self.choice.prob(from, index as usize);
+        let prob = self.choice.prob(from, index);
         prob * self.far.near_share() * pdf
+    }
+
+    /// The item whose surface a ray has met.
+    #[inline]
+    fn item_at(&self, met: &Hit) -> Option<usize> {
+        let surface = self.surfaces.get(met.shape.0 as usize)?.as_ref()?;
+        let index = *self.item_of.get((surface.first + met.prim) as usize)?;
+        (index != NO_ITEM).then_some(index as usize)
     }
 
     /// Density per steradian at `eye` of the point `met` of an item: where it is, its normal and place.

@@ -32,6 +32,23 @@ impl Moved {
         normal(&self.to_local, n)
     }
 
+    /// A point of the surface in the world, with the bound on its error.
+    pub fn point_out(&self, p: Vec3, p_err: Vec3) -> (Vec3, Vec3) {
+        point(&self.to_world, p, p_err)
+    }
+
+    /// A unit normal of the surface in the world.
+    pub fn normal_out(&self, n: Vec3) -> Vec3 {
+        normal(&self.to_world, n)
+    }
+
+    /// Area in the world of a unit of area of the surface where its unit normal, in its own coordinates, is
+    /// `n`: an area is the volume of a prism over its height.
+    pub fn area_scale(&self, n: Vec3) -> f64 {
+        let det = self.to_world.matrix().matrix3.determinant().abs();
+        det * self.to_world.normal(n.as_dvec3()).length()
+    }
+
     /// A connection found there, in the world for the receiver at `eye`. `None` as for
     /// [`Part::sample`](super::local::Part::sample).
     pub fn out(&self, local: &Towards, eye: Vec3) -> Option<Towards> {

@@ -1,8 +1,11 @@
 //! The projector: a point that throws a picture, the reverse of a pinhole camera.
 
+use super::emission::Outlook;
 use super::spot::{Directions, mean_luminance};
 use super::tree::LightBounds;
-use crate::math::{Aabb, DVec3, PI, Rgb, Transform, Vec2, Vec3};
+use crate::math::fp::ONE_MINUS_EPSILON;
+use crate::math::warp::Tabulated2;
+use crate::math::{Aabb, DVec2, DVec3, PI, Rgb, Transform, Vec2, Vec3};
 use crate::texture::{At, Texture};
 
 /// What makes a projector.
@@ -28,6 +31,8 @@ pub struct Projector {
     /// π and all scales.
     factor: f32,
     half_extent: Vec2,
+    /// Brightness of the picture, by which directions are drawn; `None` for a constant one.
+    table: Option<Tabulated2>,
 }
 
 impl Projector {
@@ -36,6 +41,7 @@ impl Projector {
         let depth = spec.to_world.vector(DVec3::Z).length() as f32;
         let [x, y] = spec.half_extent;
         Projector {
+            table: tabulate(&spec.irradiance),
             p: (spec.to_world.point(DVec3::ZERO) - center).as_vec3(),
             to_local: Directions::new(&spec.to_world),
             irradiance: spec.irradiance,
@@ -74,9 +80,40 @@ impl Projector {
         (mean * self.factor * area).min(f32::MAX)
     }
 
+    /// Angle from the axis to the corners of the picture.
+    fn corner(&self) -> f32 {
+        self.half_extent.x.hypot(self.half_extent.y).atan()
+    }
+
+    pub(super) fn outlook(&self) -> Outlook {
+        self.to_local.outlook(self.corner())
+    }
+
+    /// A direction through the picture by its brightness, with density [`Projector::pdf_direction`].
+    pub(super) fn sample_direction(&self, u: Vec2) -> Option<Vec3> {
+        let uv = self.table.as_ref().map_or(u, |table| table.sample(u).0);
+        let at = (DVec2::ONE - 2.0 * uv.as_dvec2()) * self.half_extent.as_dvec2();
+        self.to_local.world(at.extend(1.0))
+    }
+
+    /// Density per steradian of [`Projector::sample_direction`] at the unit vector `d`.
+    pub(super) fn pdf_direction(&self, d: Vec3) -> f64 {
+        let (l, jacobian) = self.to_local.density(d);
+        let half = self.half_extent.as_dvec2();
+        let q = l.truncate() / (l.z * half);
+        if !(l.z > 0.0 && q.abs().max_element() <= 1.0) {
+            return 0.0;
+        }
+        let density = self.table.as_ref().map_or(1.0, |table| {
+            let uv = (0.5 - 0.5 * q).as_vec2();
+            f64::from(table.pdf(uv.min(Vec2::splat(ONE_MINUS_EPSILON))))
+        });
+        // Per area of the plane at unit depth, which is cos³ steradians each.
+        density / (4.0 * half.x * half.y) * jacobian / l.z.powi(3)
+    }
+
     pub(super) fn bounds(&self) -> LightBounds {
-        let corner = self.half_extent.x.hypot(self.half_extent.y).atan();
-        let (axis, cos_spread, cos_reach) = self.to_local.cone(corner);
+        let (axis, cos_spread, cos_reach) = self.to_local.cone(self.corner());
         LightBounds {
             bounds: Aabb {
                 min: self.p,
@@ -88,4 +125,41 @@ impl Projector {
             power: self.power(),
         }
     }
+}
+
+/// Most cells of the table along each side, and samples along each side of a cell.
+const MAX_SIDE: usize = 512;
+const FINE: usize = 3;
+/// Weight that each cell gets of the mean over the picture: the table is made of samples, which may have
+/// missed a bright spot.
+const FLOOR: f32 = 0.02;
+
+fn tabulate(picture: &Texture) -> Option<Tabulated2> {
+    let [w, h] = match picture {
+        Texture::Constant(_) => return None,
+        Texture::Bitmap(b) => [b.texels.width, b.texels.height],
+        // Of unknown grain.
+        _ => [128; 2],
+    }
+    .map(|n| (n as usize).clamp(1, MAX_SIDE));
+    let step = Vec2::new((w * FINE) as f32, (h * FINE) as f32).recip();
+    let mut weights = vec![0f32; w * h];
+    for y in 0..h * FINE {
+        for x in 0..w * FINE {
+            let uv = (Vec2::new(x as f32, y as f32) + 0.5) * step;
+            let at = At {
+                uv,
+                ..At::default()
+            };
+            let value = picture.eval(&at).luminance();
+            weights[y / FINE * w + x / FINE] += match value.is_finite() {
+                true => value.max(0.0) / (FINE * FINE) as f32,
+                false => 0.0,
+            };
+        }
+    }
+    let mean = weights.iter().map(|&w| f64::from(w)).sum::<f64>() / (w * h) as f64;
+    let floor = (FLOOR * mean as f32).max(f32::MIN_POSITIVE);
+    weights.iter_mut().for_each(|w| *w += floor);
+    Tabulated2::new(&weights, w, h)
 }

@@ -106,7 +106,7 @@ fn sample_cells(part: &Part, g: &Geometry, radiance: &Texture, side: usize) -> V
 }
 
 /// The point that `u` in [0,1)² gives, uniform over the area, and the place on the surface.
-fn place(part: &Part, g: &Geometry, u: Vec2) -> (SurfaceSample, At) {
+pub(super) fn place(part: &Part, g: &Geometry, u: Vec2) -> (SurfaceSample, At) {
     match (part, g) {
         (Part::Triangle { prim, .. }, Geometry::Mesh(m)) => {
             let bary = warp::triangle(u);
@@ -267,6 +267,18 @@ pub(super) fn sample(
     (towards.pdf > 0.0 && towards.pdf < f32::MAX).then_some((towards, at))
 }
 
+/// Density per unit of area of the points that follow the table, relative to that of uniform ones, at the
+/// point `p` of the surface.
+pub(super) fn table_density(
+    part: &Part,
+    g: &Geometry,
+    table: &Tabulated2,
+    p: Vec3,
+    at: &At,
+) -> f32 {
+    table.pdf(locate(part, g, p, at))
+}
+
 fn table_pdf(
     part: &Part,
     g: &Geometry,
@@ -274,7 +286,7 @@ fn table_pdf(
     eye: Vec3,
     (p, ng, at): (Vec3, Vec3, &At),
 ) -> f32 {
-    let density = f64::from(table.pdf(locate(part, g, p, at)));
+    let density = f64::from(table_density(part, g, table, p, at));
     pdf_a_to_sr(local::bounded(density / part.area(g)), p - eye, ng)
 }
 

@@ -75,6 +75,28 @@ impl IntegratorSpec {
         }
     }
 
+    /// Edges from which on Russian roulette may end a walk, in estimators that play it.
+    pub fn rr_depth(&mut self) -> Option<&mut u32> {
+        match self {
+            IntegratorSpec::Path(spec) => Some(&mut spec.rr_depth),
+            IntegratorSpec::Direct(_) => None,
+            IntegratorSpec::Bidirectional(spec) => Some(&mut spec.rr_depth),
+            IntegratorSpec::Combined(spec) => Some(&mut spec.path.rr_depth),
+            IntegratorSpec::PhotonMapper(spec) => Some(&mut spec.path.rr_depth),
+        }
+    }
+
+    /// How photons are shot and gathered, in estimators that do.
+    pub fn photons(&mut self) -> Option<&mut PhotonSpec> {
+        match self {
+            IntegratorSpec::Path(_)
+            | IntegratorSpec::Direct(_)
+            | IntegratorSpec::PhotonMapper(_) => None,
+            IntegratorSpec::Bidirectional(spec) => Some(&mut spec.photons),
+            IntegratorSpec::Combined(spec) => Some(&mut spec.photons),
+        }
+    }
+
     /// What the estimator decides on in `scene`, for the plan.
     pub fn plan(&self, scene: &Scene) -> Option<PlanEntry> {
         match self {

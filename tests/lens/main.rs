@@ -1,8 +1,12 @@
-//! Cameras and meters: their rays as measured with Mitsuba, what a lens blurs, and what meters read.
+//! Cameras and meters: their rays as measured with Mitsuba, how they see points, what a lens blurs, and
+//! what meters read.
 
 mod rays;
 #[path = "../common/render.rs"]
 mod render;
+#[path = "../common/mod.rs"]
+mod rng;
+mod sights;
 
 use luxel::math::Vec2;
 use luxel::scene::camera::Aperture;

@@ -93,6 +93,7 @@ pub fn compile(desc: &SceneDesc, overrides: &Overrides) -> Result<Compiled, Scen
         warnings.push("the scene has no emitter, so the picture is black".to_string());
     }
     let camera = camera::camera(&sensor, shutter, &mut film.spec, (&world, measured), center)?;
+    integrator::check_camera(&integrator, &camera, (&root, &sensor.props), overrides)?;
     camera::plan(&camera, camera.moves() || world.moves(), shutter, &mut plan);
     let materials = materials.finish(&mut plan, &mut warnings);
     desc.check_all_read()?;

@@ -42,10 +42,10 @@ const PHOTON_COUNT: Param = Param::optional(
     Kind::Int(1, 1 << 31),
     "Walks of light per iteration, that is per sample of each pixel; without it, as many as the image has pixels.",
 );
-const RADIUS: Param = Param::optional(
-    "radius",
-    Kind::Float(Range::Positive),
-    "Radius that photons are gathered from in the first iteration, in scene units; without it, two pixels as the camera sees the scene.",
+const INITIAL_RADIUS: Param = Param::optional(
+    "initial_radius",
+    Kind::Float(Range::NonNegative),
+    "Radius that photons are gathered from in the first iteration, in scene units; without it or 0, two pixels as the camera sees the scene.",
 );
 const ALPHA: Param = Param::float(
     "alpha",
@@ -58,6 +58,28 @@ const MEMORY: Param = Param::int(
     (1, 1 << 24),
     4096,
     "Most memory for photons, in MiB.",
+);
+const MAX_PASSES: Param = Param::int(
+    "max_passes",
+    (-1, i32::MAX as i64),
+    -1,
+    "Only -1: a pass is a sample of each pixel, and the sampler or the command line says how many.",
+);
+const GRANULARITY: Param = Param::int(
+    "granularity",
+    (0, i32::MAX as i64),
+    0,
+    "How work is divided; without effect on the image.",
+);
+const LIGHT_IMAGE: Param = Param::bool(
+    "light_image",
+    true,
+    "Connect walks of light to the camera too, where the sensor can be connected to; only true.",
+);
+const SAMPLE_DIRECT: Param = Param::bool(
+    "sample_direct",
+    true,
+    "Connect vertices to emitters by points made for them; only true.",
 );
 const INTEGRATORS: &[Slot] = &[Slot::new(Category::Integrator, 0, usize::MAX)];
 
@@ -183,7 +205,7 @@ pub const PLUGINS: &[Plugin] = &[
             RR_DEPTH,
             HIDE,
             PHOTON_COUNT,
-            RADIUS,
+            INITIAL_RADIUS,
             ALPHA,
             MEMORY,
             PER_PASS,
@@ -191,6 +213,59 @@ pub const PLUGINS: &[Plugin] = &[
             BLOCK,
         ],
         "Path tracing that leaves caustics to photons; biased by their radius, which shrinks; luxel only.",
+    ),
+    integrator(
+        "bdpt",
+        &[
+            MAX_DEPTH,
+            RR_DEPTH,
+            HIDE,
+            LIGHT_IMAGE,
+            SAMPLE_DIRECT,
+            PER_PASS,
+            TIMEOUT,
+            BLOCK,
+        ],
+        "Bidirectional path tracing: walks from the eye and from lights, connected in all ways.",
+    ),
+    integrator(
+        "ptracer",
+        &[MAX_DEPTH, RR_DEPTH, HIDE, PER_PASS, TIMEOUT, BLOCK],
+        "Light tracing: walks from lights alone, connected to the camera.",
+    ),
+    integrator(
+        "vcm",
+        &[
+            MAX_DEPTH,
+            RR_DEPTH,
+            HIDE,
+            PHOTON_COUNT,
+            INITIAL_RADIUS,
+            ALPHA,
+            MEMORY,
+            PER_PASS,
+            TIMEOUT,
+            BLOCK,
+        ],
+        "Vertex connection and merging: bidirectional path tracing and photons together; biased by the photons' radius, which shrinks; luxel only.",
+    ),
+    integrator(
+        "sppm",
+        &[
+            MAX_DEPTH,
+            RR_DEPTH,
+            HIDE,
+            PHOTON_COUNT,
+            INITIAL_RADIUS,
+            ALPHA,
+            MEMORY,
+            MAX_PASSES,
+            GRANULARITY,
+            PER_PASS,
+            TIMEOUT,
+            BLOCK,
+        ],
+        "Stochastic progressive photon mapping: all light by photons; biased by their radius, which shrinks.",
     ),
     Plugin {
         exclusive: &[

@@ -152,12 +152,15 @@ const TABLE: &[(Category, &[&str], &str)] = &[
     ),
     (
         Integrator,
-        &[
-            "ptracer", "ppm", "sppm", "bdpt", "mlt", "pssmlt", "erpt", "vpl", "irrcache",
-            "adaptive",
-        ],
-        METHOD,
+        &["ppm"],
+        "use the integrator \"sppm\", which shoots photons for every pass and keeps none",
     ),
+    (
+        Integrator,
+        &["mlt", "pssmlt", "erpt"],
+        "luxel mutates no paths; use the integrator \"bdpt\" or \"vcm\"",
+    ),
+    (Integrator, &["vpl", "irrcache", "adaptive"], METHOD),
     (
         Integrator,
         &["depth"],

@@ -187,6 +187,12 @@ impl World {
         self.places.get(place.0 as usize)
     }
 
+    /// The first placement of the group of `shape`; [`PlaceId::NONE`] if it is in none.
+    pub fn place_of(&self, shape: ShapeId) -> PlaceId {
+        let place = self.placed.get(shape.0 as usize);
+        place.copied().unwrap_or(PlaceId::NONE)
+    }
+
     /// The nearest surface along `ray`. Only with `tangents` do shading frames follow dp/du.
     #[inline]
     pub fn intersect(&self, ray: &Ray, tangents: bool) -> Option<Hit> {

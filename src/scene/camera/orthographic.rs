@@ -1,5 +1,6 @@
 //! The orthographic camera: parallel rays.
 
+use super::connect::Extent;
 use super::{CameraSample, Pose};
 use crate::film::FilmSpec;
 use crate::geom::Ray;
@@ -19,10 +20,11 @@ pub struct OrthographicSpec {
 #[derive(Clone, Copy, Debug)]
 pub struct Orthographic {
     /// Top left corner of the picture in the camera's coordinates, and the change per pixel.
-    corner: Vec2,
-    per_pixel: Vec2,
-    near: f32,
-    length: f32,
+    pub(super) corner: Vec2,
+    pub(super) per_pixel: Vec2,
+    pub(super) near: f32,
+    pub(super) length: f32,
+    pub(super) extent: Extent,
 }
 
 impl Orthographic {
@@ -34,6 +36,7 @@ impl Orthographic {
             per_pixel: Vec2::splat(per_pixel as f32),
             near: spec.near_clip as f32,
             length: (spec.far_clip - spec.near_clip) as f32,
+            extent: Extent::new(film),
         }
     }
 

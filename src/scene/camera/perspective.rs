@@ -1,9 +1,10 @@
 //! The perspective camera: pinhole or thin lens.
 
+use super::connect::Extent;
 use super::{CameraSample, Lens, Pose};
 use crate::film::FilmSpec;
 use crate::geom::Ray;
-use crate::math::Vec2;
+use crate::math::{Vec2, Vec3};
 
 /// Which side of the picture the field of view spans.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,10 +48,11 @@ pub struct PerspectiveSpec {
 pub struct Perspective {
     /// Direction (at unit depth) of the picture's top left corner from the middle of the lens, and its
     /// change per pixel.
-    corner: Vec2,
-    per_pixel: Vec2,
-    near: f32,
-    far: f32,
+    pub(super) corner: Vec2,
+    pub(super) per_pixel: Vec2,
+    pub(super) near: f32,
+    pub(super) far: f32,
+    pub(super) extent: Extent,
     lens: Lens,
 }
 
@@ -74,6 +76,7 @@ impl Perspective {
             per_pixel,
             near: spec.near_clip as f32,
             far: spec.far_clip as f32,
+            extent: Extent::new(film),
             lens: spec.lens,
         }
     }
@@ -93,24 +96,31 @@ impl Perspective {
         1.0 + lens + self.corner.abs().max(opposite.abs()).length()
     }
 
-    /// The ray from a point of the lens to where the plane of focus shows the point of the picture. It
-    /// begins on the near plane and ends on the far plane.
+    /// The point of the lens that `lens` chooses, and how far a ray from there is turned, at unit depth, so
+    /// that it meets the plane of focus where that from the middle does.
     #[inline]
-    pub fn ray(&self, pose: &Pose, sample: &CameraSample) -> Ray {
-        let d = self.corner + self.per_pixel * sample.film;
-        let (d, start) = match self.lens {
-            Lens::Pinhole => (d, pose.origin),
+    pub(super) fn through_lens(&self, pose: &Pose, lens: Vec2) -> (Vec3, Vec2) {
+        match self.lens {
+            Lens::Pinhole => (pose.origin, Vec2::ZERO),
             Lens::Thin {
                 radius,
                 slope,
                 aperture,
             } => {
-                let point = aperture.sample(sample.lens);
-                // At unit depth, whatever the focal distance: it may be beyond all numbers.
+                let point = aperture.sample(lens);
                 let on_lens = radius * (pose.axes.x_axis * point.x + pose.axes.y_axis * point.y);
-                (d - slope * point, pose.origin + on_lens)
+                // At unit depth, whatever the focal distance: it may be beyond all numbers.
+                (pose.origin + on_lens, slope * point)
             }
-        };
+        }
+    }
+
+    /// The ray from a point of the lens to where the plane of focus shows the point of the picture. It
+    /// begins on the near plane and ends on the far plane.
+    #[inline]
+    pub fn ray(&self, pose: &Pose, sample: &CameraSample) -> Ray {
+        let (start, shift) = self.through_lens(pose, sample.lens);
+        let d = self.corner + self.per_pixel * sample.film - shift;
         let d = d.extend(1.0);
         let length = d.length();
         let d = pose.axes * (d / length);

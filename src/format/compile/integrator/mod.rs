@@ -1,17 +1,17 @@
 //! The integrator, and the layers that its wrappers ask for.
 
+mod bidir;
 mod layers;
 mod photons;
+
+pub use bidir::check_camera;
 
 use super::{on_command_line, suggest};
 use crate::format::plugins::Category;
 use crate::format::{Overrides, Props, SceneError};
 use crate::render::AovLayer;
 use crate::transport::aov::Aov;
-use crate::transport::{
-    BidirSpec, CombinedSpec, DirectSpec, IntegratorSpec, Method, PathSpec, PhotonMapperSpec,
-    PhotonSpec,
-};
+use crate::transport::{CombinedSpec, DirectSpec, IntegratorSpec, PathSpec, PhotonMapperSpec};
 
 const NAMES: [&str; 8] = [
     "path",
@@ -23,7 +23,6 @@ const NAMES: [&str; 8] = [
     "combined",
     "photonmapper",
 ];
-const DEFAULT_RR_DEPTH: u32 = 5;
 
 pub fn integrator(
     root: &Props,
@@ -76,6 +75,9 @@ fn unwrap(props: &Props, found: &mut Vec<AovLayer>) -> Result<Option<IntegratorS
             Ok(Some(IntegratorSpec::PhotonMapper(spec)))
         }
         "direct" => direct(props, hide_emitters).map(Some),
+        "bdpt" | "ptracer" | "vcm" | "sppm" => {
+            bidir::spec(props, path(props, hide_emitters)?).map(Some)
+        }
         wrapper => {
             if wrapper == "moment" {
                 layers::add(found, "m2", Aov::SecondMoment).map_err(|what| props.error(what))?;
@@ -139,21 +141,8 @@ fn replaced(mut spec: IntegratorSpec, name: &str) -> Result<IntegratorSpec, Scen
     if name == spec.name() {
         return Ok(spec);
     }
-    let bidirectional = |method| {
-        IntegratorSpec::Bidirectional(BidirSpec {
-            method,
-            max_depth: None,
-            rr_depth: DEFAULT_RR_DEPTH,
-            hide_emitters: false,
-            photons: PhotonSpec::default(),
-        })
-    };
     let mut new = match name {
         "path" => IntegratorSpec::Path(PathSpec::default()),
-        "bdpt" => bidirectional(Method::Bdpt),
-        "ptracer" => bidirectional(Method::Ptracer),
-        "vcm" => bidirectional(Method::Vcm),
-        "sppm" => bidirectional(Method::Sppm),
         "combined" => IntegratorSpec::Combined(CombinedSpec::default()),
         "photonmapper" => IntegratorSpec::PhotonMapper(PhotonMapperSpec::default()),
         "direct" => IntegratorSpec::Direct(DirectSpec {
@@ -161,11 +150,24 @@ fn replaced(mut spec: IntegratorSpec, name: &str) -> Result<IntegratorSpec, Scen
             bsdf_samples: 1,
             hide_emitters: false,
         }),
-        _ => {
-            let what = format!("unknown integrator \"{name}\"");
-            return Err(on_command_line("--integrator", name, what).with_help(suggest(name, NAMES)));
-        }
+        _ => match bidir::named(name) {
+            Some(spec) => spec,
+            None => {
+                let what = format!("unknown integrator \"{name}\"");
+                let error = on_command_line("--integrator", name, what);
+                return Err(error.with_help(suggest(name, NAMES)));
+            }
+        },
     };
     *new.hide_emitters() = *spec.hide_emitters();
+    if let (Some(to), Some(from)) = (new.max_depth(), spec.max_depth()) {
+        *to = *from;
+    }
+    if let (Some(to), Some(from)) = (new.rr_depth(), spec.rr_depth()) {
+        *to = *from;
+    }
+    if let (Some(to), Some(from)) = (new.photons(), spec.photons()) {
+        *to = from.clone();
+    }
     Ok(new)
 }

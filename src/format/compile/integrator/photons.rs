@@ -14,8 +14,8 @@ pub fn spec(props: &Props) -> Result<PhotonSpec, SceneError> {
             true => Some(props.int("photon_count")? as u64),
             false => None,
         },
-        radius: match given("radius") {
-            true => Some(props.float("radius")? as f32),
+        radius: match given("initial_radius") {
+            true => Some(props.float("initial_radius")? as f32).filter(|r| *r > 0.0),
             false => None,
         },
         alpha: props.float("alpha")? as f32,

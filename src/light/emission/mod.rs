@@ -4,9 +4,21 @@
 //! what follows. Bidirectional methods weigh them against the density with which a receiver would have
 //! connected to the same start ([`Lights::pdf_connection`]).
 
-use super::Lights;
-use crate::geom::{Geometry, Hit, Ray};
-use crate::math::{Rgb, Vec2};
+mod aim;
+mod far;
+mod lights;
+mod sources;
+mod surface;
+
+pub use aim::{Aim, Target};
+
+pub(super) use aim::Outlook;
+pub(super) use far::Cover;
+pub(super) use sources::Sources;
+
+use super::local;
+use crate::geom::{Hit, Ray};
+use crate::math::{Rgb, Vec2, Vec3};
 
 /// What decides an emission, in [0,1) each.
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +44,8 @@ pub struct EmissionPdf {
     /// Of what follows: per steradian from the start where light diverges, else per unit of area across the
     /// ray.
     pub onward: f32,
-    /// |cos| of the emission at the shading normal of a surface; 1 where there is none.
+    /// |cos| of the emission at the geometric normal of a surface, which turns a density per steradian at the
+    /// receiver into one per unit of area there; 1 where there is no surface.
     pub cos: f32,
     /// Whether light spreads from the start, so that its density falls with the squared distance.
     pub diverges: bool,
@@ -71,7 +84,7 @@ pub enum Source {
     /// A point or beam: the light of this number (see [`Lights::choose`]).
     Item(u32),
     /// Infinity, along this emitter's number, with the unit direction that leads to it.
-    Far { emitter: u32, wi: crate::math::Vec3 },
+    Far { emitter: u32, wi: Vec3 },
 }
 
 /// Light that leaves an emitter.
@@ -85,63 +98,40 @@ pub struct Emission {
     pub source: Source,
 }
 
-/// Where light is aimed at: spheres around what can throw a caustic. Empty: nowhere in particular.
-#[derive(Clone, Debug, Default)]
-pub struct Aim {
-    /// Share of the emission that is aimed, 0 to 1. With 1, light that meets none of the targets first is
-    /// never emitted.
-    pub share: f32,
-    pub targets: Vec<Target>,
+/// Densities before they are rounded to f32, which holds no density of areas below 1e-38.
+#[derive(Clone, Copy, Debug)]
+struct Densities {
+    start: f64,
+    onward: f64,
+    cos: f64,
+    diverges: bool,
+    can_be_met: bool,
 }
 
-/// A sphere, in scene coordinates.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Target {
-    pub center: crate::math::Vec3,
-    pub radius: f32,
-}
-
-impl Lights {
-    /// Light that leaves one of the emitters, chosen in proportion to power.
-    pub fn sample_emission(
-        &self,
-        _geoms: &[Geometry],
-        _aim: &Aim,
-        _u: &EmissionNumbers,
-    ) -> Option<Emission> {
-        None
+impl Densities {
+    /// `None` where either is zero: nothing is emitted like this.
+    fn rounded(&self) -> Option<EmissionPdf> {
+        let possible = self.start > 0.0 && self.onward > 0.0 && self.cos > 0.0;
+        possible.then(|| EmissionPdf {
+            start: local::bounded(self.start),
+            onward: local::bounded(self.onward),
+            cos: local::bounded(self.cos),
+            diverges: self.diverges,
+            can_be_met: self.can_be_met,
+        })
     }
 
-    /// As [`Lights::sample`], with the densities of the light that would have come from there by emission.
-    pub fn sample_both_ways(
-        &self,
-        _geoms: &[Geometry],
-        _aim: &Aim,
-        _from: &Hit,
-        _u_pick: f32,
-        _u: Vec2,
-    ) -> Option<(super::EmitterSample, EmissionPdf)> {
-        None
-    }
-
-    /// Densities with which [`Lights::sample_emission`] lets light start at `met` along `met.wo`.
-    pub fn pdf_emission(&self, _geoms: &[Geometry], _aim: &Aim, _met: &Hit) -> Option<EmissionPdf> {
-        None
-    }
-
-    /// The same for light from infinity that arrives at `at` from the direction `wi`.
-    pub fn pdf_emission_escaped(
-        &self,
-        _aim: &Aim,
-        _at: &Hit,
-        _wi: crate::math::Vec3,
-    ) -> Option<EmissionPdf> {
-        None
-    }
-
-    /// Density with which [`Lights::sample`] connects `from` to `source`, in the measure of
-    /// [`EmissionPdf::start`].
-    pub fn pdf_connection(&self, _geoms: &[Geometry], _from: &Hit, _source: &Source) -> f32 {
-        0.0
+    /// The emission of `le` (radiance, intensity or irradiance) along `ray`. `None` where there is none.
+    fn emission(&self, ray: Ray, le: Rgb, source: Source) -> Option<Emission> {
+        let factor = self.cos / (self.start * self.onward);
+        // Channel by channel in f64: the factor alone may leave the range of f32.
+        let power = le.map(|c| (f64::from(c) * factor) as f32);
+        let pdf = self.rounded()?;
+        (power.is_finite() && !power.is_black()).then_some(Emission {
+            ray,
+            power,
+            pdf,
+            source,
+        })
     }
 }
