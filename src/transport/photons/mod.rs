@@ -2,12 +2,14 @@
 
 mod kernel;
 mod map;
+mod nearest;
 mod photon;
 mod radius;
 mod trace;
 
 pub use kernel::{Kernel, KernelShape};
 pub use map::{PhotonMap, RADII};
+pub use nearest::NearestMap;
 pub use photon::Photon;
 pub use radius::{footprint, reduced};
 pub use trace::{Shoot, Tally};
