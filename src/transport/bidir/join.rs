@@ -63,6 +63,19 @@ pub struct EyeVertex {
 }
 
 impl EyeVertex {
+    /// f |cos| towards `wi`, the density per steradian with which the walk goes on there, and
+    /// [`EyeVertex::pdf_back`].
+    #[inline]
+    pub fn eval(&self, scene: &Scene, wi: Vec3) -> (Rgb, f32, f32) {
+        match self.shading.is_bent() {
+            true => {
+                let (f_cos, pdf) = self.shading.eval_pdf(wi, Mode::Radiance);
+                (f_cos, pdf, self.pdf_back(scene, wi))
+            }
+            false => self.shading.eval_both_pdfs(wi),
+        }
+    }
+
     /// Density per steradian with which a walk of light that comes against `wi` goes on towards the eye.
     #[inline]
     pub fn pdf_back(&self, scene: &Scene, wi: Vec3) -> f32 {
@@ -158,10 +171,11 @@ impl EyeWalk<'_> {
         let scene = self.engine.setting.scene;
         let hit = &vertex.hit;
         let aim = &self.engine.aim;
-        let Some((light, emitted)) = scene.sample_light_both_ways(aim, hit, u.pick, u.light) else {
+        let sampled = scene.sample_light_both_ways(aim, hit, u.pick, u.light);
+        let Some((light, emitted, prob)) = sampled else {
             return Rgb::BLACK;
         };
-        let (f_cos, pdf) = vertex.shading.eval_pdf(light.wi, Mode::Radiance);
+        let (f_cos, pdf, back) = vertex.eval(scene, light.wi);
         if f_cos.is_black() {
             return Rgb::BLACK;
         }
@@ -173,7 +187,7 @@ impl EyeWalk<'_> {
         }
         let dist2 = f64::from(light.dist).powi(2);
         let (met, connected) = match light.density {
-            Density::Delta => (0.0, f64::from(emitted.start)),
+            Density::Delta => (0.0, f64::from(prob)),
             Density::PerSr(density) => (
                 mis::power(f64::from(pdf) / f64::from(density)),
                 f64::from(density) * emitted.start_per_sr(dist2),
@@ -181,9 +195,8 @@ impl EyeWalk<'_> {
         };
         let cos = f64::from(hit.ng.dot(light.wi).abs());
         let walked = f64::from(emitted.start) * emitted.arrival(dist2, cos) / connected;
-        let back = f64::from(vertex.pdf_back(scene, light.wi));
         // Light straight from an emitter is not merged.
-        let rivals = met + mis::power(walked) * vertex.state.bracket(back, 0.0);
+        let rivals = met + mis::power(walked) * vertex.state.bracket(f64::from(back), 0.0);
         f_cos * light.weight() * (seen / (1.0 + rivals) as f32)
     }
 
@@ -198,7 +211,7 @@ impl EyeWalk<'_> {
         let Some((wi, dist2)) = direction(from.p - hit.p) else {
             return Rgb::BLACK;
         };
-        let (f_cos, pdf) = vertex.shading.eval_pdf(wi, Mode::Radiance);
+        let (f_cos, pdf, back) = vertex.eval(scene, wi);
         if f_cos.is_black() {
             return Rgb::BLACK;
         }
@@ -221,10 +234,12 @@ impl EyeWalk<'_> {
         let (_, light_pdf) = light.shading.eval_pdf(-wi, Mode::Importance);
         let there = f64::from(pdf) * cos_there / dist2;
         let here = f64::from(light_pdf) * cos_here / dist2;
-        let back = f64::from(vertex.pdf_back(scene, wi));
         let merging = merging_at(&self.techniques, light);
         let rivals = mis::power(there) * light.state.bracket(f64::from(light_back), merging)
-            + mis::power(here) * vertex.state.bracket(back, self.techniques.merging);
+            + mis::power(here)
+                * vertex
+                    .state
+                    .bracket(f64::from(back), self.techniques.merging);
         let weight = f64::from(seen) / (dist2 * (1.0 + rivals));
         f_cos * light.power * scattered * weight as f32
     }
@@ -232,28 +247,24 @@ impl EyeWalk<'_> {
     /// Light of the photons around `vertex`.
     fn merge(&self, vertex: &EyeVertex, photons: &Photons) -> Rgb {
         let scene = self.engine.setting.scene;
-        let (hit, shading) = (&vertex.hit, &vertex.shading);
+        let hit = &vertex.hit;
         let here = mis::power(vertex.state.pdf * self.techniques.merging);
         let mut sum = Rgb::BLACK;
-        photons.map.within(hit.p, |photon, _| {
+        photons.map.around(hit.p, |photon, offset, _| {
             if photon.edges + vertex.edges > self.engine.max_depth
-                || photon.ng.dot(hit.ng) < SAME_SIDE
+                || !photons.kernel.accepts(hit, photon.ng, offset)
             {
                 return;
             }
-            let (f_cos, pdf) = shading.eval_pdf(photon.wi, Mode::Radiance);
+            let (f_cos, pdf, back) = vertex.eval(scene, photon.wi);
             if f_cos.is_black() {
                 return;
             }
-            let back = f64::from(vertex.pdf_back(scene, photon.wi));
             let behind = photon.cut + pdf * pdf * photon.reverse;
-            let ahead = ratio(vertex.state.sum(back), here);
+            let ahead = ratio(vertex.state.sum(f64::from(back)), here);
             let cos = hit.ng.dot(photon.wi).abs();
             sum += photon.power * f_cos * (1.0 / (cos * (1.0 + behind + ahead)));
         });
         sum * photons.density
     }
 }
-
-/// Least cosine between the normals where a photon lies and where it is gathered.
-const SAME_SIDE: f32 = 0.5;
