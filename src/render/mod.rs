@@ -176,6 +176,12 @@ impl Job {
         (film, stats)
     }
 
+    /// Whether what the integrator keeps beside the film fits into the memory that it may take; if not, what is
+    /// wrong.
+    pub fn fits(&self) -> Result<(), String> {
+        self.transport(1).fits()
+    }
+
     /// The integrator, ready to take samples.
     fn transport(&self, replicates: u32) -> Transport<'_> {
         let setting = Setting {
