@@ -216,7 +216,7 @@ impl Scene {
     }
 
     /// As [`Scene::sample_light`], with the densities of the light that would have come from there by
-    /// emission.
+    /// emission, and the probability of the choice of the light.
     #[inline]
     pub fn sample_light_both_ways(
         &self,
@@ -224,7 +224,7 @@ impl Scene {
         from: &Hit,
         u_pick: f32,
         u: Vec2,
-    ) -> Option<(EmitterSample, EmissionPdf)> {
+    ) -> Option<(EmitterSample, EmissionPdf, f32)> {
         let geoms = self.world.geometries();
         self.lights.sample_both_ways(geoms, aim, from, u_pick, u)
     }

@@ -30,7 +30,8 @@ impl Lights {
         }
     }
 
-    /// As [`Lights::sample`], with the densities of the light that would have come from there by emission.
+    /// As [`Lights::sample`], with the densities of the light that would have come from there by emission, and
+    /// the probability of the choice of the light.
     pub fn sample_both_ways(
         &self,
         geoms: &[Geometry],
@@ -38,8 +39,8 @@ impl Lights {
         from: &Hit,
         u_pick: f32,
         u: Vec2,
-    ) -> Option<(EmitterSample, EmissionPdf)> {
-        let (index, rest, share) = match self.far.pick(u_pick) {
+    ) -> Option<(EmitterSample, EmissionPdf, f32)> {
+        let (index, prob) = match self.far.pick(u_pick) {
             (Some(index), share, _) => {
                 let emitter = *self.far.emitters.get(index)?;
                 let sample = self.sample_far(emitter, u, share)?;
@@ -49,16 +50,16 @@ impl Lights {
                     }
                     _ => self.pdf_sky_emission(aim, from, sample.wi),
                 }?;
-                return Some((sample, pdf));
+                return Some((sample, pdf, share));
             }
             (None, share, rest) => {
                 let (index, prob) = self.choice.pick(from, rest)?;
-                (index, prob, share)
+                (index, prob * share)
             }
         };
-        let sample = self.sample_item(geoms, from, index, rest * share, u)?;
+        let sample = self.sample_item(geoms, from, index, prob, u)?;
         let pdf = self.pdf_of_connection(geoms, aim, from, index, &sample)?;
-        Some((sample, pdf.rounded()?))
+        Some((sample, pdf.rounded()?, prob))
     }
 
     /// Densities of the emission from the end of a connection to item `index`.

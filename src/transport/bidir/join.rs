@@ -159,7 +159,8 @@ impl EyeWalk<'_> {
         let scene = self.engine.setting.scene;
         let hit = &vertex.hit;
         let aim = &self.engine.aim;
-        let Some((light, emitted)) = scene.sample_light_both_ways(aim, hit, u.pick, u.light) else {
+        let sampled = scene.sample_light_both_ways(aim, hit, u.pick, u.light);
+        let Some((light, emitted, prob)) = sampled else {
             return Rgb::BLACK;
         };
         let (f_cos, pdf) = vertex.shading.eval_pdf(light.wi, Mode::Radiance);
@@ -174,7 +175,7 @@ impl EyeWalk<'_> {
         }
         let dist2 = f64::from(light.dist).powi(2);
         let (met, connected) = match light.density {
-            Density::Delta => (0.0, f64::from(emitted.start)),
+            Density::Delta => (0.0, f64::from(prob)),
             Density::PerSr(density) => (
                 mis::power(f64::from(pdf) / f64::from(density)),
                 f64::from(density) * emitted.start_per_sr(dist2),
@@ -236,9 +237,9 @@ impl EyeWalk<'_> {
         let (hit, shading) = (&vertex.hit, &vertex.shading);
         let here = mis::power(vertex.state.pdf * self.techniques.merging);
         let mut sum = Rgb::BLACK;
-        photons.map.within(hit.p, |photon, _| {
+        photons.map.around(hit.p, |photon, offset, _| {
             if photon.edges + vertex.edges > self.engine.max_depth
-                || photon.ng.dot(hit.ng) < SAME_SIDE
+                || !photons.kernel.accepts(hit, photon.ng, offset)
             {
                 return;
             }
@@ -255,6 +256,3 @@ impl EyeWalk<'_> {
         sum * photons.density
     }
 }
-
-/// Least cosine between the normals where a photon lies and where it is gathered.
-const SAME_SIDE: f32 = 0.5;

@@ -11,7 +11,7 @@ mod join;
 use super::light_walk::LightWalk;
 use super::mis::Techniques;
 use super::path::UNBOUNDED;
-use super::photons::{self, PhotonMap};
+use super::photons::{self, Kernel, KernelShape, PhotonMap, Shoot};
 use super::{Iteration, Ledger, Li, PhotonSpec, Setting};
 use crate::geom::Ray;
 use crate::light::Aim;
@@ -65,6 +65,7 @@ pub struct BidirSpec {
 /// The photons of one iteration.
 pub struct Photons {
     map: PhotonMap<Photon>,
+    kernel: Kernel,
     /// One over the number of walks that made the photons and the area that they are gathered from.
     density: f32,
     techniques: Techniques,
@@ -143,22 +144,23 @@ impl<'a> Engine<'a> {
             merging: self.photons as f64 * f64::from(area),
             ..self.techniques
         };
-        let walk = self.light_walk(techniques);
-        let mut found = Vec::new();
-        for i in 0..self.photons {
-            let stream = crate::sampler::mix(self.setting.seed ^ PHOTONS);
-            let sampler = Sampler::new(self.setting.sampler, stream, number, i, 1);
-            walk.walk(&sampler, time.unwrap_or(0.0), &mut ledger.rays, |vertex| {
-                if vertex.scattered > 0 && self.setting.scene.receives(&vertex.hit) {
-                    found.push((vertex.hit.p, Photon::new(vertex, techniques.merging)));
-                }
-                true
-            });
-        }
+        let scene = self.setting.scene;
+        let shoot = Shoot {
+            setting: self.setting,
+            walk: self.light_walk(techniques),
+            count: self.photons,
+            iteration: number,
+            time: time.unwrap_or(0.0),
+        };
+        let (found, _) = shoot.trace(ledger, |vertex| {
+            (vertex.scattered > 0 && scene.receives(&vertex.hit))
+                .then(|| Photon::new(vertex, techniques.merging))
+        });
         Iteration {
             time,
             photons: Some(Photons {
                 map: PhotonMap::new(found, radius),
+                kernel: Kernel::new(KernelShape::Uniform, radius),
                 density: (1.0 / techniques.merging) as f32,
                 techniques,
             }),
@@ -226,6 +228,3 @@ impl<'a> Engine<'a> {
 
 /// Radius of the first iteration's disk in pixels.
 const RADIUS_IN_PIXELS: f32 = 2.0;
-
-/// Sets the numbers of photons apart from those of pixels.
-const PHOTONS: u64 = 0x7068_6f74_6f6e_0001;
