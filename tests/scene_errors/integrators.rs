@@ -60,7 +60,8 @@ a.xml:3:54: "initial_radius" must be a number of at least 0, not -1
         r#"
 a.xml:3:32: unknown parameter "initial_radius" of integrator "bdpt"
   <integrator type='bdpt'><float name='initial_radius' value='1'/></integrator>
-                                 ^"#,
+                                 ^
+  help: known are "max_depth", "rr_depth", "hide_emitters", "light_image", "sample_direct", "samples_per_pass", "timeout" and "block_size""#,
     );
 }
 
