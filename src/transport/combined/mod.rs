@@ -125,6 +125,11 @@ impl<'a> Combined<'a> {
         }
     }
 
+    /// Of the disk that photons of iteration `number` are gathered from.
+    pub fn radius(&self, number: u64) -> f32 {
+        photons::reduced(self.radius, self.spec.photons.alpha, number)
+    }
+
     /// Shoots the photons of iteration `number`.
     pub fn begin(&self, number: u64, ledger: &mut Ledger) -> Iteration {
         let time = self.setting.common_time(number);
@@ -134,7 +139,7 @@ impl<'a> Combined<'a> {
                 ..Iteration::default()
             };
         }
-        let radius = photons::reduced(self.radius, self.spec.photons.alpha, number);
+        let radius = self.radius(number);
         let shoot = Shoot {
             setting: self.setting,
             walk: LightWalk {
@@ -153,7 +158,7 @@ impl<'a> Combined<'a> {
         Iteration {
             time,
             caustics: Some(Caustics {
-                map: PhotonMap::new(photons, radius),
+                map: ledger.build_map(|| PhotonMap::new(photons, radius)),
                 kernel: Kernel::new(KernelShape::Epanechnikov, radius),
                 share: 1.0 / self.count.max(1) as f32,
             }),
@@ -180,6 +185,7 @@ impl<'a> Combined<'a> {
         let (scene, start) = (self.setting.scene, Start::at_camera(ray));
         let li = path.walk(scene, start, sampler, &mut ledger.rays, &mut gathering);
         ledger.record(Technique::Merging, gathering.found);
+        ledger.record(Technique::Path, li.radiance - gathering.found);
         li
     }
 }

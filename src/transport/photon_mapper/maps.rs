@@ -112,7 +112,7 @@ impl Wanted {
         let count = (self.photons as f64 / per_walk.max(WORTH)).ceil() as u64;
         let (photons, _) = Shoot { count, ..shoot }.trace(ledger, store);
         Map {
-            photons: PhotonMap::new(photons, self.radius),
+            photons: ledger.build_map(|| PhotonMap::new(photons, self.radius)),
             kernel: Kernel::new(KernelShape::Epanechnikov, self.radius),
             share: 1.0 / count.max(1) as f32,
         }
