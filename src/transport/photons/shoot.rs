@@ -100,12 +100,7 @@ impl Volley<'_> {
         photons
     }
 
-    fn follow<T>(
-        &self,
-        i: u64,
-        found: &mut Found<T>,
-        keep: &impl Fn(&LightVertex) -> Option<T>,
-    ) {
+    fn follow<T>(&self, i: u64, found: &mut Found<T>, keep: &impl Fn(&LightVertex) -> Option<T>) {
         let Setting { sampler, seed, .. } = self.setting;
         let sampler = Sampler::new(sampler, mix(seed ^ self.stream), self.number, i, 1);
         let Found { photons, rays } = found;
