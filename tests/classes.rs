@@ -12,9 +12,9 @@ use luxel::transport::{
 use render::compile;
 use stats::{Running, normal_p_value, sidak};
 
-/// A room with a glass and a mirror ball, a mask in front, a plastic wall and one that is half a mirror, under a
-/// light so large that path tracing finds its caustics too. `balls` replaces the glass ball.
-fn room(balls: &str) -> String {
+/// An open room with a glass and a mirror ball, a mask in front, a plastic wall and one that is half a mirror, lit by
+/// what path tracing finds the caustics of too. `ball` is a third ball.
+fn room(ball: &str, light: &str) -> String {
     let wall = |place: &str, material: &str| {
         format!(
             r#"<shape type="rectangle"><transform name="to_world"><scale value="2"/>{place}</transform>
@@ -39,15 +39,13 @@ fn room(balls: &str) -> String {
         <bsdf type="mask" id="mask"><float name="opacity" value="0.4"/>
             <bsdf type="twosided"><bsdf type="diffuse"/></bsdf></bsdf>
         {}{}{}{}
-        {balls}
+        {ball}
         <shape type="sphere"><point name="center" x="0.6" y="-0.65" z="-0.4"/>
             <float name="radius" value="0.35"/>
             <bsdf type="conductor"><string name="material" value="none"/></bsdf></shape>
         <shape type="rectangle"><transform name="to_world">
             <scale value="0.5"/><translate x="0.5" y="0.2" z="1.2"/></transform><ref id="mask"/></shape>
-        <shape type="rectangle"><transform name="to_world">
-            <scale value="1.2"/><rotate x="1" angle="90"/><translate y="1.4"/></transform>
-            <emitter type="area"><rgb name="radiance" value="2"/></emitter></shape>
+        {light}
         </scene>"#,
         wall(r#"<rotate x="1" angle="-90"/><translate y="-1"/>"#, "wall"),
         wall(r#"<translate z="-1.5"/>"#, "wall"),
@@ -62,6 +60,10 @@ fn room(balls: &str) -> String {
     )
 }
 
+const LAMP: &str = r#"<shape type="rectangle"><transform name="to_world">
+    <scale value="1.2"/><rotate x="1" angle="90"/><translate y="1.4"/></transform>
+    <emitter type="area"><rgb name="radiance" value="2"/></emitter></shape>"#;
+const SKY: &str = r#"<emitter type="constant"/>"#;
 const GLASS: &str = r#"<shape type="sphere"><point name="center" x="-0.5" y="-0.5" z="0"/>
     <float name="radius" value="0.4"/><bsdf type="dielectric"/></shape>"#;
 const MOVING_GLASS: &str = r#"<shape type="sphere"><float name="radius" value="0.4"/>
@@ -156,28 +158,29 @@ fn check_caustics(xml: &str, max_depth: u32, runs: u64, spp: u64) -> f64 {
 
 #[test]
 fn photons_find_the_caustics_that_path_tracing_finds() {
-    let xml = room(GLASS);
     // Of edges: light, glass or mirror, receiver, eye; one inside of the glass; many.
-    for (max_depth, runs) in [(3, 6), (4, 6), (9, 20)] {
-        let relative = check_caustics(&xml, max_depth, runs, 256);
+    for (light, max_depth, runs, largest) in [
+        (SKY, 3, 3, 0.01),
+        (SKY, 4, 3, 0.01),
+        (SKY, 9, 12, 0.003),
+        (LAMP, 9, 3, 0.06),
+    ] {
+        let relative = check_caustics(&room(GLASS, light), max_depth, runs, 128);
         println!("depth {max_depth}: standard error {relative:.4}");
-        assert!(
-            max_depth < 9 || relative < 0.0035,
-            "1 % could hide: {relative}"
-        );
+        assert!(relative < largest, "{largest} could hide: {relative}");
     }
 }
 
 #[test]
 fn photons_and_eye_share_the_time_of_what_moves() {
-    let relative = check_caustics(&room(MOVING_GLASS), 8, 12, 256);
+    let relative = check_caustics(&room(MOVING_GLASS, SKY), 8, 4, 128);
     println!("standard error {relative:.4}");
-    assert!(relative < 0.02, "{relative}");
+    assert!(relative < 0.01, "{relative}");
 }
 
 #[test]
 fn classes_sum_to_the_picture() {
-    let xml = room(GLASS);
+    let xml = room(GLASS, LAMP);
     let [all, rest, caustics] = [Show::All, Show::WithoutCaustics, Show::CausticsAlone]
         .map(|show| picture(&xml, combined(8, show, 0.05), 16, 3));
     for ((all, rest), caustics) in all.iter().zip(&rest).zip(&caustics) {
@@ -200,8 +203,8 @@ fn without_photons_combined_is_path_bit_for_bit() {
     for (xml, depth, show) in [
         (small(diffuse), 6, Show::All),
         (small(mirror), 6, Show::All),
-        (room(GLASS), 2, Show::All),
-        (room(GLASS), 6, Show::AllByPath),
+        (room(GLASS, LAMP), 2, Show::All),
+        (room(GLASS, LAMP), 6, Show::AllByPath),
     ] {
         let got = picture(&xml, combined(depth, show, 0.1), 16, 1);
         let expected = picture(&xml, IntegratorSpec::Path(path(depth)), 16, 1);
@@ -270,9 +273,17 @@ fn beams_throw_caustics_that_no_path_from_the_eye_finds() {
 
 #[test]
 fn bias_falls_with_the_radius() {
-    let xml = room(GLASS);
-    let of = |radius| picture(&xml, combined(8, Show::CausticsAlone, radius), 512, 1);
-    let reference = of(0.01);
+    let xml = room(GLASS, LAMP);
+    let of = |radius| {
+        let mut integrator = combined(4, Show::CausticsAlone, radius);
+        if let IntegratorSpec::Combined(spec) = &mut integrator {
+            spec.photons.count = Some(20_000);
+            // No reduction, so that the radius is what it is.
+            spec.photons.alpha = 1.0;
+        }
+        picture(&xml, integrator, 48, 1)
+    };
+    let reference = of(0.05);
     let error = |radius| {
         let picture = of(radius);
         let squares = picture
@@ -281,10 +292,10 @@ fn bias_falls_with_the_radius() {
             .map(|(a, b)| (a[0] - b[0]).powi(2));
         squares.sum::<f64>().sqrt()
     };
-    let errors = [0.4, 0.2, 0.1].map(error);
+    let errors = [0.8, 0.4, 0.2].map(error);
     println!("{errors:?}");
     assert!(
-        errors[1] < 0.7 * errors[0] && errors[2] < 0.7 * errors[1],
+        errors[1] < 0.8 * errors[0] && errors[2] < 0.7 * errors[1],
         "{errors:?}"
     );
 }
@@ -305,29 +316,32 @@ fn photon_mapper(max_depth: u32) -> PhotonMapperSpec {
 
 #[test]
 fn photon_maps_agree_with_path_tracing_within_their_bias() {
-    for (name, xml) in [("still", room(GLASS)), ("moving", room(MOVING_GLASS))] {
+    for (name, xml) in [
+        ("still", room(GLASS, LAMP)),
+        ("moving", room(MOVING_GLASS, LAMP)),
+    ] {
         let spec = PhotonMapperSpec {
             global_photons: if name == "still" { 40_000 } else { 4000 },
             caustic_photons: if name == "still" { 40_000 } else { 4000 },
             ..photon_mapper(8)
         };
-        let got = tiles(&picture(&xml, IntegratorSpec::PhotonMapper(spec), 32, 1));
-        let expected = tiles(&picture(&xml, IntegratorSpec::Path(path(8)), 2048, 1));
+        let got = tiles(&picture(&xml, IntegratorSpec::PhotonMapper(spec), 16, 1));
+        let expected = tiles(&picture(&xml, IntegratorSpec::Path(path(8)), 1024, 1));
         for (i, (a, b)) in got.iter().zip(&expected).enumerate() {
             assert!(
-                (a / b - 1.0).abs() < 0.05,
+                (a / b - 1.0).abs() < 0.08,
                 "{name}, tile {i}: {a}, path tracing {b}"
             );
         }
         let ratio = got.iter().sum::<f64>() / expected.iter().sum::<f64>();
         println!("{name}: {ratio}");
-        assert!((ratio - 1.0).abs() < 0.015, "{name}: {ratio}");
+        assert!((ratio - 1.0).abs() < 0.02, "{name}: {ratio}");
     }
 }
 
 #[test]
 fn threads_change_nothing() {
-    let xml = room(GLASS);
+    let xml = room(GLASS, LAMP);
     for integrator in [
         combined(8, Show::All, 0.05),
         IntegratorSpec::PhotonMapper(photon_mapper(8)),
