@@ -3,10 +3,12 @@
 
 mod estimate;
 mod filter;
+mod parts;
 mod splat;
 
 pub use estimate::{ErrorEstimate, student_t_95};
 pub use filter::{Filter, FilterSampler};
+pub use parts::PartMoments;
 pub use splat::{Splat, SplatBand, SplatBuffer};
 
 use crate::math::Rgb;
@@ -78,6 +80,7 @@ pub struct Tile {
     aov_channels: usize,
     rgb: Vec<[f64; 3]>,
     aov: Vec<f64>,
+    parts: parts::Parts,
 }
 
 impl Tile {
@@ -141,6 +144,7 @@ impl Film {
                         aov_channels,
                         rgb: vec![[0.0; 3]; pixels * replicates as usize],
                         aov: vec![0.0; pixels * aov_channels],
+                        parts: parts::Parts::default(),
                     }
                 })
             })

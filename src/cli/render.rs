@@ -15,7 +15,7 @@ use super::{Failure, Outcome};
 use crate::film::{Film, Window};
 use crate::format::{self, Overrides};
 use crate::image_io::{self, Image};
-use crate::render::{Job, Metadata, Stats, Stop, percent};
+use crate::render::{Job, Metadata, Stats, Stop, TechniqueStats, percent};
 
 #[derive(Args, Debug)]
 pub struct RenderArgs {
@@ -313,6 +313,30 @@ fn statistics(
     let plan: Vec<_> = plan
         .map(|e| json!({ "subject": e.subject, "decision": e.decision, "reason": e.reason }))
         .collect();
+    let phases = &stats.phases;
+    let mut clock = json!({
+        "load": seconds.load.as_secs_f64(),
+        "build": seconds.build.as_secs_f64(),
+        "precompute": phases.precompute(),
+        "render": stats.seconds - phases.precompute(),
+        "write": seconds.write.as_secs_f64(),
+    });
+    let techniques = job.technique_stats(film, stats);
+    if !techniques.is_empty() {
+        clock["photons"] = json!(phases.photons);
+        clock["map"] = json!(phases.map);
+        clock["camera"] = json!(phases.samples);
+        clock["splats"] = json!(phases.splats);
+    }
+    let describe = |t: &TechniqueStats| {
+        json!({
+            "name": t.name,
+            "energy_share": t.energy_share,
+            "variance": t.variance,
+            "rays": t.rays,
+        })
+    };
+    let techniques: Vec<_> = techniques.iter().map(describe).collect();
     json!({
         "version": env!("CARGO_PKG_VERSION"),
         "scene": metadata.scene,
@@ -321,13 +345,7 @@ fn statistics(
         "spp": film.spp(),
         "seed": job.seed,
         "threads": threads,
-        "seconds": {
-            "load": seconds.load.as_secs_f64(),
-            "build": seconds.build.as_secs_f64(),
-            "precompute": 0.0,
-            "render": stats.seconds,
-            "write": seconds.write.as_secs_f64(),
-        },
+        "seconds": clock,
         "rays": {
             "camera": stats.rays.camera,
             "shadow": stats.rays.shadow,
@@ -338,6 +356,7 @@ fn statistics(
         "peak_memory_bytes": peak_memory(),
         "estimated_error": film.estimate_error().map(|e| json!({ "relmse": e.relmse, "ci95": e.ci95 })),
         "invalid_samples": stats.invalid.count,
+        "techniques": techniques,
         "plan": plan,
     })
 }

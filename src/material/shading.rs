@@ -69,6 +69,22 @@ impl Shading {
         }
     }
 
+    /// [`Shading::eval_pdf`] for radiance, and the density per steradian with which [`Shading::sample`] would
+    /// return `hit.wo` if the surface were seen from `wi`; for a frame that does not depend on that.
+    #[inline]
+    pub fn eval_both_pdfs(&self, wi: Vec3) -> (Rgb, f32, f32) {
+        let local = self.frame.to_local(wi);
+        let Some(shadowing) = self.shadowing(wi, local) else {
+            return (Rgb::BLACK, 0.0, 0.0);
+        };
+        let (f, pdf) = self.bsdf.eval_pdf(self.wo, local, Mode::Radiance);
+        let back = match f.is_black() {
+            true => 0.0,
+            false => self.bsdf.pdf(local, self.wo),
+        };
+        (f * (local.z.abs() * shadowing), pdf, back)
+    }
+
     /// What the weight of a sample in [`Mode::Importance`] is multiplied with to be that of light which goes
     /// on along `wi`: where shading and geometric normals differ, light crosses the surface by the one and is
     /// scattered by the other (Veach 1997, section 5.3.2).

@@ -1,8 +1,11 @@
 //! Rendering: passes over the film, when to stop, and what it cost.
 
 mod picture;
+mod splats;
+mod techniques;
 
 pub use picture::{ComponentFormat, Metadata, PixelFormat};
+pub use techniques::TechniqueStats;
 
 use std::ops::{ControlFlow, Range};
 use std::time::{Duration, Instant};
@@ -14,7 +17,9 @@ use crate::math::{Rgb, Vec2};
 use crate::sampler::{Sampler, SamplerKind, dim};
 use crate::scene::{Camera, CameraSample, Scene};
 use crate::transport::aov::{self, Aov};
-use crate::transport::{IntegratorSpec, Iteration, Ledger, PathStats, Setting, Transport};
+use crate::transport::{
+    IntegratorSpec, Iteration, Ledger, PathStats, PerTechnique, Setting, Technique, Transport,
+};
 
 /// A layer of arbitrary output variables that the picture gets beside its colours.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -66,8 +71,68 @@ impl Invalid {
 #[derive(Clone, Debug, Default)]
 pub struct Stats {
     pub rays: PathStats,
+    /// All of it.
     pub seconds: f64,
+    pub phases: Phases,
     pub invalid: Invalid,
+    /// Of the shadow rays, those that were traced for one technique alone.
+    pub connections: PerTechnique<u64>,
+    /// Of the photon rays, those of photons that were shot ahead of the samples.
+    pub shot: u64,
+    /// Radius of the disk that photons are gathered from in the first and in the last iteration, in scene units;
+    /// `None` where there is none.
+    pub radius: Option<[f32; 2]>,
+}
+
+/// Where the time went, in seconds on the clock.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Phases {
+    /// What all iterations share.
+    pub setup: f64,
+    /// Shooting photons.
+    pub photons: f64,
+    /// Sorting them into maps.
+    pub map: f64,
+    /// The pixels' samples.
+    pub samples: f64,
+    /// Bringing light to the pixels where it arrives.
+    pub splats: f64,
+}
+
+impl Phases {
+    /// What went before the samples.
+    pub fn precompute(&self) -> f64 {
+        self.setup + self.photons + self.map
+    }
+}
+
+impl Stats {
+    fn add(&mut self, later: Stats) {
+        self.rays += later.rays;
+        self.seconds += later.seconds;
+        self.invalid.merge(later.invalid);
+        self.shot += later.shot;
+        for (sum, n) in self.connections.iter_mut().zip(later.connections) {
+            *sum += n;
+        }
+        let (sum, more) = (&mut self.phases, later.phases);
+        sum.setup += more.setup;
+        sum.photons += more.photons;
+        sum.map += more.map;
+        sum.samples += more.samples;
+        sum.splats += more.splats;
+        self.radius = match (self.radius, later.radius) {
+            (Some([first, _]), Some([_, last])) => Some([first, last]),
+            (a, b) => a.or(b),
+        };
+    }
+
+    fn add_ledger(&mut self, ledger: &Ledger) {
+        self.rays += ledger.rays;
+        for (sum, n) in self.connections.iter_mut().zip(ledger.connections) {
+            *sum += n;
+        }
+    }
 }
 
 /// Longest pass: how often progress is shown and a request to stop is heard, memory and samples allowing.
@@ -83,7 +148,8 @@ impl Job {
         let crop = self.film.crop;
         let pixels = u64::from(crop.width) * u64::from(crop.height);
         let channels = self.aovs.iter().map(|l| l.aov.channels().len()).sum();
-        Film::new(crop, film::replicates(spp, pixels), channels)
+        let parts = self.integrator.techniques(&self.scene).len();
+        Film::new(crop, film::replicates(spp, pixels), channels).with_parts(parts)
     }
 
     /// Renders until `stop` or until `on_pass`, called after every pass, breaks. Which samples a pass
@@ -98,10 +164,10 @@ impl Job {
         let mut film = self.new_film(stop);
         let mut stats = Stats::default();
         let transport = self.transport(film.replicates());
+        stats.phases.setup = start.elapsed().as_secs_f64();
         while let Some(n) = next_pass(stop, film.spp(), start.elapsed()) {
             let pass = self.add_pass(&transport, &mut film, n);
-            stats.rays += pass.rays;
-            stats.invalid.merge(pass.invalid);
+            stats.add(pass);
             stats.seconds = start.elapsed().as_secs_f64();
             if on_pass(&film, &stats).is_break() {
                 break;
@@ -131,8 +197,13 @@ impl Job {
 
     /// Takes the next `n` samples of every pixel, on all threads of the current pool.
     pub fn add_samples(&self, film: &mut Film, n: u64) -> Stats {
+        let start = Instant::now();
         let transport = self.transport(film.replicates());
-        self.add_pass(&transport, film, n)
+        let setup = start.elapsed().as_secs_f64();
+        let mut stats = self.add_pass(&transport, film, n);
+        stats.phases.setup = setup;
+        stats.seconds += setup;
+        stats
     }
 
     fn add_pass(&self, transport: &Transport, film: &mut Film, n: u64) -> Stats {
@@ -147,6 +218,12 @@ impl Job {
             self.add_iteration(transport, film, n, &mut stats, None);
         }
         stats.seconds = start.elapsed().as_secs_f64();
+        let radius = |number: u64| transport.radius(number);
+        if n > 0 {
+            stats.radius = radius(film.spp() - n)
+                .zip(radius(film.spp() - 1))
+                .map(<[f32; 2]>::from);
+        }
         stats
     }
 
@@ -161,8 +238,19 @@ impl Job {
     ) {
         let filter = FilterSampler::new(&self.film.filter);
         let first = film.spp();
+        let start = Instant::now();
         let mut ledger = Ledger::default();
         let iteration = transport.begin(first, &mut ledger);
+        let begun = start.elapsed().as_secs_f64();
+        stats.phases.map += ledger.map_seconds;
+        stats.phases.photons += (begun - ledger.map_seconds).max(0.0);
+        stats.shot += ledger.rays.photon;
+        stats.add_ledger(&ledger);
+        // A film that was not made for this job keeps none of their moments.
+        let techniques = match film.parts() {
+            0 => &[],
+            _ => self.integrator.techniques(&self.scene),
+        };
         let pass = Pass {
             job: self,
             transport,
@@ -170,34 +258,24 @@ impl Job {
             filter: &filter,
             moving: self.camera.moves() || self.scene.moves(),
             samples: first..first + n,
+            techniques,
         };
         let work = |tile: &mut Tile| pass.render_tile(tile);
-        let done: Vec<(Ledger, Invalid)> = film.tiles_mut().par_iter_mut().map(work).collect();
-        stats.rays += ledger.rays;
-        for (ledger, invalid) in &done {
-            stats.rays += ledger.rays;
-            stats.invalid.merge(invalid.clone());
+        let mut done: Vec<(Ledger, Invalid)> = film.tiles_mut().par_iter_mut().map(work).collect();
+        for (ledger, invalid) in &mut done {
+            stats.add_ledger(ledger);
+            stats.invalid.merge(std::mem::take(invalid));
         }
+        stats.phases.samples += start.elapsed().as_secs_f64() - begun;
         if let Some(splats) = splats {
-            let all = done.iter().flat_map(|(ledger, _)| &ledger.splats);
-            let mut any = false;
-            for splat in all {
-                let value = splat.value;
-                if value.is_finite() && value.min_component() >= 0.0 {
-                    any = true;
-                    splats.add(splat);
-                } else {
-                    let pixel = splat.film.floor().max(Vec2::ZERO).as_uvec2();
-                    let first_one = Some((pixel.x, pixel.y, first, value));
-                    stats.invalid.merge(Invalid {
-                        count: 1,
-                        first: first_one,
-                    });
-                }
+            let start = Instant::now();
+            let lists = done.iter_mut().map(|(ledger, _)| &mut ledger.splats);
+            let lists: Vec<_> = lists.filter(|list| !list.is_empty()).collect();
+            if !lists.is_empty() {
+                let part = techniques.iter().position(|t| *t == Technique::Splat);
+                stats.invalid.merge(splats::add(lists, splats, film, part));
             }
-            if any {
-                film.add_everywhere(&splats.take());
-            }
+            stats.phases.splats += start.elapsed().as_secs_f64();
         }
         film.finish_pass(n);
     }
@@ -211,6 +289,7 @@ struct Pass<'a> {
     filter: &'a FilterSampler,
     moving: bool,
     samples: Range<u64>,
+    techniques: &'static [Technique],
 }
 
 impl Pass<'_> {
@@ -246,9 +325,20 @@ impl Pass<'_> {
                     let mut li = transport.sample(iteration, &at, ray, &sampler, &mut ledger);
                     li.radiance *= seen.weight;
                     let radiance = li.radiance;
+                    // Splats are told apart where they arrive.
+                    let mut parts = PerTechnique::default();
+                    if !self.techniques.is_empty() {
+                        parts = ledger.take_parts();
+                    }
                     // A NaN fails the comparison too.
                     if radiance.is_finite() && radiance.min_component() >= 0.0 {
                         tile.add(x, y, s, radiance * weight);
+                        for (i, technique) in self.techniques.iter().enumerate() {
+                            if *technique != Technique::Splat {
+                                let part = parts[*technique as usize];
+                                tile.add_part(x, y, i, part * f64::from(seen.weight * weight));
+                            }
+                        }
                     } else {
                         invalid.count += 1;
                         invalid.first = invalid.first.or(Some((px, py, s, radiance)));
@@ -284,7 +374,9 @@ fn next_pass(stop: Stop, done: u64, elapsed: Duration) -> Option<u64> {
         }
         Stop::Time(limit) => {
             let left = limit.checked_sub(elapsed)?.as_secs_f64();
-            let n = affordable(left.min(PASS.as_secs_f64())).min(done);
+            // A sample of all pixels may take longer than a pass should.
+            let n = affordable(PASS.as_secs_f64()).max(1);
+            let n = n.min(affordable(left)).min(done);
             (n > 0).then_some(n)
         }
     }

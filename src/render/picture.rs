@@ -141,6 +141,12 @@ impl Job {
             "command_line": metadata.command_line,
             "integrator": self.integrator.name(),
             "biased": if self.integrator.biased() { "yes" } else { "no" },
+            "bias": stats.radius.map(|[first, last]| json!({
+                "of": "light gathered from disks: detail smaller than them is blurred",
+                "parameter": "radius",
+                "first": first,
+                "last": last,
+            })),
             "sampler": self.sampler.name(),
             "spp": film.spp(),
             "seed": self.seed,

@@ -1,6 +1,8 @@
 //! What samples leave behind beside their radiance: counts of rays, light for other pixels, and how much each
 //! technique brought.
 
+use std::time::Instant;
+
 use super::light_walk::LightVertex;
 use crate::film::Splat;
 use crate::math::Rgb;
@@ -37,6 +39,8 @@ pub enum Technique {
     Emission,
     /// A vertex of the eye's walk is connected to a point of an emitter.
     NextEvent,
+    /// Both of these, where they are not told apart.
+    Path,
     /// Vertices of both walks are connected.
     Connection,
     /// A vertex of the light's walk is connected to the camera.
@@ -45,18 +49,66 @@ pub enum Technique {
     Merging,
 }
 
+impl Technique {
+    pub const COUNT: usize = 6;
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Technique::Emission => "emission",
+            Technique::NextEvent => "next_event",
+            Technique::Path => "path",
+            Technique::Connection => "connection",
+            Technique::Splat => "splat",
+            Technique::Merging => "merging",
+        }
+    }
+}
+
+/// A number per technique, at `technique as usize`.
+pub type PerTechnique<T> = [T; Technique::COUNT];
+
 /// The books of one thread.
 #[derive(Clone, Debug, Default)]
 pub struct Ledger {
     pub rays: PathStats,
+    /// Of the shadow rays, those that were traced for one technique alone.
+    pub connections: PerTechnique<u64>,
     /// Light for wherever in the picture it arrives, in the order it was found.
     pub splats: Vec<Splat>,
+    /// Seconds spent on sorting photons into maps, by the thread that waited for it.
+    pub map_seconds: f64,
+    /// Luminance that the sample under way owes to each technique.
+    parts: PerTechnique<f64>,
     /// Where walks from lights are kept while they are joined with one from the eye.
     pub(super) light: Vec<LightVertex>,
 }
 
 impl Ledger {
-    /// Notes what `technique` brought to the picture: a weighted contribution.
+    /// Notes what `technique` brought to the sample under way: a weighted contribution, all of which add up to
+    /// the sample's radiance. Splats are counted where they arrive instead.
     #[inline]
-    pub fn record(&mut self, _technique: Technique, _value: Rgb) {}
+    pub fn record(&mut self, technique: Technique, value: Rgb) {
+        self.parts[technique as usize] += f64::from(value.luminance());
+    }
+
+    /// Counts a shadow ray that `technique` needs.
+    #[inline]
+    pub fn connect(&mut self, technique: Technique) {
+        self.rays.shadow += 1;
+        self.connections[technique as usize] += 1;
+    }
+
+    /// What was recorded since the last call.
+    #[inline]
+    pub fn take_parts(&mut self) -> PerTechnique<f64> {
+        std::mem::take(&mut self.parts)
+    }
+
+    /// Makes a photon map with `build`, on the clock.
+    pub fn build_map<T>(&mut self, build: impl FnOnce() -> T) -> T {
+        let start = Instant::now();
+        let map = build();
+        self.map_seconds += start.elapsed().as_secs_f64();
+        map
+    }
 }

@@ -14,7 +14,7 @@ pub mod photons;
 
 pub use bidir::{BidirSpec, Method};
 pub use combined::{CombinedSpec, Show};
-pub use ledger::{Ledger, PathStats, Technique};
+pub use ledger::{Ledger, PathStats, PerTechnique, Technique};
 pub use path::{DirectSpec, PathSpec};
 pub use photon_mapper::PhotonMapperSpec;
 pub use photons::PhotonSpec;
@@ -103,6 +103,17 @@ impl IntegratorSpec {
             IntegratorSpec::Combined(spec) => Some(spec.plan(scene)),
             IntegratorSpec::PhotonMapper(spec) => Some(spec.plan(scene)),
             _ => None,
+        }
+    }
+
+    /// The techniques whose shares are told apart, where there are several; none for other integrators.
+    pub fn techniques(&self, scene: &Scene) -> &'static [Technique] {
+        match self {
+            IntegratorSpec::Bidirectional(spec) => spec.method.techniques(),
+            IntegratorSpec::Combined(spec) if spec.shoots(scene) => {
+                &[Technique::Path, Technique::Merging]
+            }
+            _ => &[],
         }
     }
 
@@ -203,6 +214,16 @@ impl<'a> Transport<'a> {
             Work::Path(_) | Work::Direct(_) => false,
             Work::Bidirectional(_) | Work::Combined(_) => true,
             Work::PhotonMapper(engine) => engine.iterates(),
+        }
+    }
+
+    /// Radius of the disk that photons of iteration `number` are gathered from, in scene units: what blurs the
+    /// picture. `None` where none are, or where it differs from place to place.
+    pub fn radius(&self, number: u64) -> Option<f32> {
+        match &self.work {
+            Work::Bidirectional(engine) => Some(engine.radius(number)).filter(|r| *r > 0.0),
+            Work::Combined(engine) => Some(engine.radius(number)),
+            Work::Path(_) | Work::Direct(_) | Work::PhotonMapper(_) => None,
         }
     }
 

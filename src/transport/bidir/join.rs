@@ -63,6 +63,19 @@ pub struct EyeVertex {
 }
 
 impl EyeVertex {
+    /// f |cos| towards `wi`, the density per steradian with which the walk goes on there, and
+    /// [`EyeVertex::pdf_back`].
+    #[inline]
+    pub fn eval(&self, scene: &Scene, wi: Vec3) -> (Rgb, f32, f32) {
+        match self.shading.is_bent() {
+            true => {
+                let (f_cos, pdf) = self.shading.eval_pdf(wi, Mode::Radiance);
+                (f_cos, pdf, self.pdf_back(scene, wi))
+            }
+            false => self.shading.eval_both_pdfs(wi),
+        }
+    }
+
     /// Density per steradian with which a walk of light that comes against `wi` goes on towards the eye.
     #[inline]
     pub fn pdf_back(&self, scene: &Scene, wi: Vec3) -> f32 {
@@ -99,7 +112,7 @@ impl Engine<'_> {
         if scattered.is_black() {
             return;
         }
-        ledger.rays.shadow += 1;
+        ledger.connect(Technique::Splat);
         let seen = scene.transmittance(&hit.spawn_to(&sight.end), passes);
         if seen == 0.0 {
             return;
@@ -114,7 +127,6 @@ impl Engine<'_> {
         };
         let weight = seen * sight.importance / ((1.0 + rivals) * self.walks) as f32;
         let value = vertex.power * scattered * weight;
-        ledger.record(Technique::Splat, value);
         ledger.splats.push(Splat {
             film: sight.film,
             value,
@@ -163,11 +175,11 @@ impl EyeWalk<'_> {
         let Some((light, emitted, prob)) = sampled else {
             return Rgb::BLACK;
         };
-        let (f_cos, pdf) = vertex.shading.eval_pdf(light.wi, Mode::Radiance);
+        let (f_cos, pdf, back) = vertex.eval(scene, light.wi);
         if f_cos.is_black() {
             return Rgb::BLACK;
         }
-        ledger.rays.shadow += 1;
+        ledger.connect(Technique::NextEvent);
         let passes = self.engine.max_depth - vertex.edges - 1;
         let seen = scene.transmittance(&light.shadow_ray(hit), passes);
         if seen == 0.0 {
@@ -183,9 +195,8 @@ impl EyeWalk<'_> {
         };
         let cos = f64::from(hit.ng.dot(light.wi).abs());
         let walked = f64::from(emitted.start) * emitted.arrival(dist2, cos) / connected;
-        let back = f64::from(vertex.pdf_back(scene, light.wi));
         // Light straight from an emitter is not merged.
-        let rivals = met + mis::power(walked) * vertex.state.bracket(back, 0.0);
+        let rivals = met + mis::power(walked) * vertex.state.bracket(f64::from(back), 0.0);
         f_cos * light.weight() * (seen / (1.0 + rivals) as f32)
     }
 
@@ -200,7 +211,7 @@ impl EyeWalk<'_> {
         let Some((wi, dist2)) = direction(from.p - hit.p) else {
             return Rgb::BLACK;
         };
-        let (f_cos, pdf) = vertex.shading.eval_pdf(wi, Mode::Radiance);
+        let (f_cos, pdf, back) = vertex.eval(scene, wi);
         if f_cos.is_black() {
             return Rgb::BLACK;
         }
@@ -213,7 +224,7 @@ impl EyeWalk<'_> {
             p_err: from.p_err,
             ng: from.ng,
         };
-        ledger.rays.shadow += 1;
+        ledger.connect(Technique::Connection);
         let seen = scene.transmittance(&hit.spawn_to(&end), passes);
         if seen == 0.0 {
             return Rgb::BLACK;
@@ -223,10 +234,12 @@ impl EyeWalk<'_> {
         let (_, light_pdf) = light.shading.eval_pdf(-wi, Mode::Importance);
         let there = f64::from(pdf) * cos_there / dist2;
         let here = f64::from(light_pdf) * cos_here / dist2;
-        let back = f64::from(vertex.pdf_back(scene, wi));
         let merging = merging_at(&self.techniques, light);
         let rivals = mis::power(there) * light.state.bracket(f64::from(light_back), merging)
-            + mis::power(here) * vertex.state.bracket(back, self.techniques.merging);
+            + mis::power(here)
+                * vertex
+                    .state
+                    .bracket(f64::from(back), self.techniques.merging);
         let weight = f64::from(seen) / (dist2 * (1.0 + rivals));
         f_cos * light.power * scattered * weight as f32
     }
@@ -234,7 +247,7 @@ impl EyeWalk<'_> {
     /// Light of the photons around `vertex`.
     fn merge(&self, vertex: &EyeVertex, photons: &Photons) -> Rgb {
         let scene = self.engine.setting.scene;
-        let (hit, shading) = (&vertex.hit, &vertex.shading);
+        let hit = &vertex.hit;
         let here = mis::power(vertex.state.pdf * self.techniques.merging);
         let mut sum = Rgb::BLACK;
         photons.map.around(hit.p, |photon, offset, _| {
@@ -243,13 +256,12 @@ impl EyeWalk<'_> {
             {
                 return;
             }
-            let (f_cos, pdf) = shading.eval_pdf(photon.wi, Mode::Radiance);
+            let (f_cos, pdf, back) = vertex.eval(scene, photon.wi);
             if f_cos.is_black() {
                 return;
             }
-            let back = f64::from(vertex.pdf_back(scene, photon.wi));
             let behind = photon.cut + pdf * pdf * photon.reverse;
-            let ahead = ratio(vertex.state.sum(back), here);
+            let ahead = ratio(vertex.state.sum(f64::from(back)), here);
             let cos = hit.ng.dot(photon.wi).abs();
             sum += photon.power * f_cos * (1.0 / (cos * (1.0 + behind + ahead)));
         });

@@ -12,7 +12,7 @@ use super::light_walk::LightWalk;
 use super::mis::Techniques;
 use super::path::UNBOUNDED;
 use super::photons::{self, Kernel, KernelShape, PhotonMap, Shoot};
-use super::{Iteration, Ledger, Li, PhotonSpec, Setting};
+use super::{Iteration, Ledger, Li, PhotonSpec, Setting, Technique};
 use crate::geom::Ray;
 use crate::light::Aim;
 use crate::math::PI;
@@ -41,6 +41,17 @@ impl Method {
             Method::Ptracer => "ptracer",
             Method::Vcm => "vcm",
             Method::Sppm => "sppm",
+        }
+    }
+
+    /// The techniques that are weighted against each other, or add up.
+    pub fn techniques(self) -> &'static [Technique] {
+        use Technique::{Connection, Emission, Merging, NextEvent, Splat};
+        match self {
+            Method::Bdpt => &[Emission, NextEvent, Connection, Splat],
+            Method::Ptracer => &[Emission, Splat],
+            Method::Vcm => &[Emission, NextEvent, Connection, Splat, Merging],
+            Method::Sppm => &[Emission, NextEvent, Merging],
         }
     }
 
@@ -132,13 +143,18 @@ impl<'a> Engine<'a> {
         }
     }
 
+    /// Of the disk that photons of iteration `number` are gathered from; 0 for methods that shoot none.
+    pub fn radius(&self, number: u64) -> f32 {
+        photons::reduced(self.radius, self.spec.photons.alpha, number)
+    }
+
     /// Begins an iteration: shoots its photons.
     pub fn begin(&self, number: u64, ledger: &mut Ledger) -> Iteration {
         if !self.spec.method.merges() {
             return Iteration::default();
         }
         let time = self.setting.common_time(number);
-        let radius = photons::reduced(self.radius, self.spec.photons.alpha, number);
+        let radius = self.radius(number);
         let area = PI * radius * radius;
         let techniques = Techniques {
             merging: self.photons as f64 * f64::from(area),
@@ -159,7 +175,7 @@ impl<'a> Engine<'a> {
         Iteration {
             time,
             photons: Some(Photons {
-                map: PhotonMap::new(found, radius),
+                map: ledger.build_map(|| PhotonMap::new(found, radius)),
                 kernel: Kernel::new(KernelShape::Uniform, radius),
                 density: (1.0 / techniques.merging) as f32,
                 techniques,

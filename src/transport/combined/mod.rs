@@ -129,6 +129,11 @@ impl<'a> Combined<'a> {
         }
     }
 
+    /// Of the disk that photons of iteration `number` are gathered from.
+    pub fn radius(&self, number: u64) -> f32 {
+        photons::reduced(self.radius, self.spec.photons.alpha, number)
+    }
+
     /// Whether the photons of an iteration fit into the memory that they may take; if not, what is wrong.
     pub fn fits(&self) -> Result<(), String> {
         let shoot = self.shoot(0, 0.0);
@@ -161,13 +166,13 @@ impl<'a> Combined<'a> {
                 ..Iteration::default()
             };
         }
-        let radius = photons::reduced(self.radius, self.spec.photons.alpha, number);
+        let radius = self.radius(number);
         let shoot = self.shoot(number, time.unwrap_or(0.0));
         let (photons, _) = shoot.trace(ledger, caustic);
         Iteration {
             time,
             caustics: Some(Caustics {
-                map: PhotonMap::new(photons, radius),
+                map: ledger.build_map(|| PhotonMap::new(photons, radius)),
                 kernel: Kernel::new(KernelShape::Epanechnikov, radius),
                 share: 1.0 / self.count.max(1) as f32,
             }),
@@ -194,6 +199,7 @@ impl<'a> Combined<'a> {
         let (scene, start) = (self.setting.scene, Start::at_camera(ray));
         let li = path.walk(scene, start, sampler, &mut ledger.rays, &mut gathering);
         ledger.record(Technique::Merging, gathering.found);
+        ledger.record(Technique::Path, li.radiance - gathering.found);
         li
     }
 }

@@ -147,7 +147,7 @@ impl Wanted {
         let (photons, _) = Shoot { count, ..shoot }.trace(ledger, store);
         let placed = photons.into_iter().map(|(p, photon)| (p, (p, photon)));
         Map {
-            photons: NearestMap::new(placed.collect()),
+            photons: ledger.build_map(|| NearestMap::new(placed.collect())),
             lookup: NonZeroUsize::new(self.lookup as usize).unwrap_or(NonZeroUsize::MIN),
             radius: self.radius,
             share: 1.0 / count.max(1) as f32,

@@ -7,7 +7,6 @@
 use rayon::prelude::*;
 
 use crate::math::Vec3;
-use crate::sampler::mix;
 
 /// Radii whose squares, and what is divided by them, stay clear of the ends of f32's range. Others are taken as
 /// the nearer of these two.
@@ -21,6 +20,9 @@ const SHARES: usize = 1 << 8;
 /// Cells along an axis that a query touches: two, and one more for rounding.
 const ACROSS: usize = 3;
 const ROWS: usize = ACROSS * ACROSS;
+
+/// Photons whose distances are computed together.
+const BLOCK: usize = 16;
 
 /// Photons in space, to be found within a fixed distance.
 pub struct PhotonMap<T> {
@@ -104,11 +106,19 @@ impl<T: Copy + Send + Sync> PhotonMap<T> {
         let (runs, count) = self.runs(p);
         for &(first, end) in &runs[..count] {
             let range = first as usize..end as usize;
-            for (q, photon) in self.points[range.clone()].iter().zip(&self.photons[range]) {
-                let offset = *q - p;
-                let d2 = offset.length_squared();
-                if d2 <= r2 {
-                    visit(photon, offset, d2);
+            let photons = &self.photons[range.clone()];
+            for (points, photons) in self.points[range].chunks(BLOCK).zip(photons.chunks(BLOCK)) {
+                // Whether a photon is near enough is hard to foresee: first all distances, without branches.
+                let mut near = 0u32;
+                let mut d2s = [0.0; BLOCK];
+                for (i, (q, d2)) in points.iter().zip(&mut d2s).enumerate() {
+                    *d2 = p.distance_squared(*q);
+                    near |= u32::from(*d2 <= r2) << i;
+                }
+                while near != 0 {
+                    let i = near.trailing_zeros() as usize;
+                    visit(&photons[i], points[i] - p, d2s[i]);
+                    near &= near - 1;
                 }
             }
         }
@@ -187,8 +197,10 @@ impl<T: Copy + Send + Sync> PhotonMap<T> {
 
     #[inline]
     fn bucket(&self, [x, y, z]: [i64; 3]) -> u64 {
-        let row = mix((y as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ mix(z as u64));
-        row.wrapping_add(x as u64) & self.mask
+        let row = (y as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15)
+            ^ (z as u64).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let row = (row ^ (row >> 32)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (row >> 32).wrapping_add(x as u64) & self.mask
     }
 
     fn bucket_of(&self, p: Vec3) -> u64 {
