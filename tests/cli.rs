@@ -138,6 +138,7 @@ fn writes_what_was_asked_for_and_statistics() {
         "rays_per_second",
         "peak_memory_bytes",
         "estimated_error",
+        "techniques",
         "plan",
     ] {
         assert!(stats.get(key).is_some(), "{key} is missing");

@@ -170,6 +170,7 @@ fn light(film: Vec2) -> Rgb {
 fn seen(filter: &Filter, window: Window) -> Vec<[f64; 3]> {
     const SIDE: u32 = 256;
     let sampler = FilterSampler::new(filter);
+    let mut rng = Rng::new(5);
     let pixel = |i: u32| {
         let corner = Vec2::new(
             (window.x + i % window.width) as f32,
@@ -177,7 +178,7 @@ fn seen(filter: &Filter, window: Window) -> Vec<[f64; 3]> {
         );
         let mut sum = [0.0; 3];
         for k in 0..SIDE * SIDE {
-            let u = (Vec2::new((k % SIDE) as f32, (k / SIDE) as f32) + 0.5) / SIDE as f32;
+            let u = (Vec2::new((k % SIDE) as f32, (k / SIDE) as f32) + rng.vec2()) / SIDE as f32;
             let (offset, weight) = sampler.sample(u);
             let l = light(corner + 0.5 + offset).to_array();
             (0..3).for_each(|c| sum[c] += f64::from(weight * l[c]));

@@ -176,6 +176,12 @@ impl Job {
         (film, stats)
     }
 
+    /// Whether what the integrator keeps beside the film fits into the memory that it may take; if not, what is
+    /// wrong.
+    pub fn fits(&self) -> Result<(), String> {
+        self.transport(1).fits()
+    }
+
     /// The integrator, ready to take samples.
     fn transport(&self, replicates: u32) -> Transport<'_> {
         let setting = Setting {
@@ -368,7 +374,9 @@ fn next_pass(stop: Stop, done: u64, elapsed: Duration) -> Option<u64> {
         }
         Stop::Time(limit) => {
             let left = limit.checked_sub(elapsed)?.as_secs_f64();
-            let n = affordable(left.min(PASS.as_secs_f64())).min(done);
+            // A sample of all pixels may take longer than a pass should.
+            let n = affordable(PASS.as_secs_f64()).max(1);
+            let n = n.min(affordable(left)).min(done);
             (n > 0).then_some(n)
         }
     }

@@ -198,6 +198,15 @@ impl<'a> Transport<'a> {
         Transport { setting, work }
     }
 
+    /// Whether the photons of the integrator fit into the memory that they may take; if not, what is wrong.
+    pub fn fits(&self) -> Result<(), String> {
+        match &self.work {
+            Work::Combined(engine) => engine.fits(),
+            Work::PhotonMapper(engine) => engine.fits(),
+            Work::Path(_) | Work::Direct(_) | Work::Bidirectional(_) => Ok(()),
+        }
+    }
+
     /// Whether each sample number is an iteration of its own: photons are shot for it, or light is splatted
     /// all over the picture.
     pub fn iterates(&self) -> bool {

@@ -5,6 +5,7 @@ mod compiling;
 mod composed;
 mod emitters;
 mod files;
+mod integrators;
 mod language;
 mod meshes;
 mod outside;

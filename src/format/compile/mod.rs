@@ -101,18 +101,20 @@ pub fn compile(desc: &SceneDesc, overrides: &Overrides) -> Result<Compiled, Scen
     if let Some(entry) = integrator.plan(&scene) {
         scene.decide(entry);
     }
+    let job = Job {
+        scene,
+        camera,
+        film: film.spec,
+        sampler: sampler.kind,
+        seed: overrides.seed.unwrap_or(sampler.seed),
+        integrator,
+        aovs,
+        pixel_format: film.pixel_format,
+        component_format: film.component_format,
+    };
+    integrator::check_memory(&job, &root, overrides)?;
     Ok(Compiled {
-        job: Job {
-            scene,
-            camera,
-            film: film.spec,
-            sampler: sampler.kind,
-            seed: overrides.seed.unwrap_or(sampler.seed),
-            integrator,
-            aovs,
-            pixel_format: film.pixel_format,
-            component_format: film.component_format,
-        },
+        job,
         spp: sampler.spp,
         warnings,
         hash: desc.hash(),

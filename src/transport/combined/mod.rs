@@ -130,17 +130,14 @@ impl<'a> Combined<'a> {
         photons::reduced(self.radius, self.spec.photons.alpha, number)
     }
 
-    /// Shoots the photons of iteration `number`.
-    pub fn begin(&self, number: u64, ledger: &mut Ledger) -> Iteration {
-        let time = self.setting.common_time(number);
-        if self.spec.show == Show::WithoutCaustics {
-            return Iteration {
-                time,
-                ..Iteration::default()
-            };
-        }
-        let radius = self.radius(number);
-        let shoot = Shoot {
+    /// Whether the photons of an iteration fit into the memory that they may take; if not, what is wrong.
+    pub fn fits(&self) -> Result<(), String> {
+        let shoot = self.shoot(0, 0.0);
+        shoot.check(self.spec.photons.memory, "photon_count", caustic)
+    }
+
+    fn shoot(&self, number: u64, time: f32) -> Shoot<'_> {
+        Shoot {
             setting: self.setting,
             walk: LightWalk {
                 scene: self.setting.scene,
@@ -152,8 +149,21 @@ impl<'a> Combined<'a> {
             },
             count: self.count,
             iteration: number,
-            time: time.unwrap_or(0.0),
-        };
+            time,
+        }
+    }
+
+    /// Shoots the photons of iteration `number`.
+    pub fn begin(&self, number: u64, ledger: &mut Ledger) -> Iteration {
+        let time = self.setting.common_time(number);
+        if self.spec.show == Show::WithoutCaustics {
+            return Iteration {
+                time,
+                ..Iteration::default()
+            };
+        }
+        let radius = self.radius(number);
+        let shoot = self.shoot(number, time.unwrap_or(0.0));
         let (photons, _) = shoot.trace(ledger, caustic);
         Iteration {
             time,

@@ -1,18 +1,26 @@
 //! The two maps, and what they tell of the light at a point.
 
+use std::num::NonZeroUsize;
+
 use super::PhotonMapper;
-use crate::math::Rgb;
+use crate::math::{PI, Rgb, Vec3};
 use crate::transport::Ledger;
 use crate::transport::combined::caustic;
 use crate::transport::light_walk::{LightVertex, LightWalk};
 use crate::transport::mis::Techniques;
 use crate::transport::path::{UNBOUNDED, Vertex};
-use crate::transport::photons::{Kernel, KernelShape, Photon, PhotonMap, Shoot};
+use crate::transport::photons::{Kernel, KernelShape, NearestMap, Photon, Shoot};
+
+/// A photon and its place: its distance alone does not tell whether it lies on the surface that is asked about.
+type Placed = (Vec3, Photon);
 
 /// Photons, and how they are gathered.
 struct Map {
-    photons: PhotonMap<Photon>,
-    kernel: Kernel,
+    photons: NearestMap<Placed>,
+    /// So many at once, ...
+    lookup: NonZeroUsize,
+    /// ... if as many lie within this distance.
+    radius: f32,
     /// One over the number of walks.
     share: f32,
 }
@@ -43,11 +51,30 @@ impl Maps {
 }
 
 impl Map {
+    /// Density estimate with a kernel that falls by the squared distance (Epanechnikov 1969), over the disk of
+    /// the nearest photons.
     fn at(&self, vertex: &Vertex, max_depth: u32) -> Estimate {
-        let sum = Photon::gather(&self.photons, &self.kernel, vertex, max_depth);
+        let hit = vertex.hit;
+        // The kernel is known once all photons are: sums of what does and what does not fall with distance.
+        let (mut sum, mut falling) = (Rgb::BLACK, Rgb::BLACK);
+        let scale = self.radius.powi(-2);
+        let visit = |(p, photon): &Placed, d2: f32| {
+            // As seen from a photon at the rim of the disk.
+            let kernel = Kernel::new(KernelShape::Uniform, d2.sqrt());
+            if let Some(lit) = photon.seen(&kernel, vertex, *p - hit.p, max_depth) {
+                sum += lit;
+                falling += lit * (d2 * scale);
+            }
+        };
+        let r2 = self.photons.nearest(hit.p, self.lookup, self.radius, visit);
+        // 2 (1 - d^2 / r^2) / (pi r^2), its mean over the disk one.
+        let r2 = f64::from(r2);
+        let peak = 2.0 / (f64::from(PI) * r2) * f64::from(self.share);
+        let fall = (1.0 / (f64::from(scale) * r2)) as f32;
         Estimate {
-            radiance: sum * self.share,
-            radius: self.photons.radius(),
+            // Rounding may leave less than nothing where all photons lie at the rim.
+            radiance: sum.zip(falling, |s, f| (s - f * fall).max(0.0)) * peak as f32,
+            radius: r2.sqrt() as f32,
         }
     }
 }
@@ -74,10 +101,12 @@ impl PhotonMapper<'_> {
         let size = 0.5 * scene.world().bounds().diagonal().length();
         let all = Wanted {
             photons: self.spec.global_photons,
+            lookup: self.spec.global_lookup,
             radius: self.spec.global_radius * size,
         };
         let caustics = Wanted {
             photons: self.spec.caustic_photons,
+            lookup: self.spec.caustic_lookup,
             radius: self.spec.caustic_radius * size,
         };
         let thrown = scene.throws_caustics().is_ok();
@@ -91,6 +120,7 @@ impl PhotonMapper<'_> {
 /// What a map is to hold.
 struct Wanted {
     photons: u64,
+    lookup: u32,
     radius: f32,
 }
 
@@ -111,12 +141,19 @@ impl Wanted {
         // Where hardly any walk leaves a photon, more walks are not worth their time.
         let count = (self.photons as f64 / per_walk.max(WORTH)).ceil() as u64;
         let (photons, _) = Shoot { count, ..shoot }.trace(ledger, store);
+        let placed = photons.into_iter().map(|(p, photon)| (p, (p, photon)));
         Map {
-            photons: ledger.build_map(|| PhotonMap::new(photons, self.radius)),
-            kernel: Kernel::new(KernelShape::Epanechnikov, self.radius),
+            photons: ledger.build_map(|| NearestMap::new(placed.collect())),
+            lookup: NonZeroUsize::new(self.lookup as usize).unwrap_or(NonZeroUsize::MIN),
+            radius: self.radius,
             share: 1.0 / count.max(1) as f32,
         }
     }
+}
+
+/// Most bytes that building maps of so many photons takes, what they come in included.
+pub fn bytes(photons: u64) -> u64 {
+    photons.saturating_mul(4 * size_of::<(Vec3, Placed)>() as u64)
 }
 
 /// Walks that tell how many photons a walk leaves.

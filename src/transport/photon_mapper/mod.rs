@@ -74,6 +74,20 @@ impl Default for PhotonMapperSpec {
 }
 
 impl PhotonMapperSpec {
+    /// Whether both maps fit into the memory that they may take; if not, what is wrong.
+    pub fn fits(&self) -> Result<(), String> {
+        let photons = self.global_photons.saturating_add(self.caustic_photons);
+        let needed = maps::bytes(photons);
+        match needed <= self.memory {
+            true => Ok(()),
+            false => Err(format!(
+                "maps of {photons} photons may take {} MiB, and \"memory\" allows {}",
+                needed >> 20,
+                self.memory >> 20
+            )),
+        }
+    }
+
     /// What is done about caustics in `scene`, and why.
     pub fn plan(&self, scene: &Scene) -> PlanEntry {
         let (decision, reason) = match scene.throws_caustics() {
@@ -108,6 +122,11 @@ impl<'a> PhotonMapper<'a> {
             aim: Aim::default(),
             still: OnceLock::new(),
         }
+    }
+
+    /// See [`PhotonMapperSpec::fits`].
+    pub fn fits(&self) -> Result<(), String> {
+        self.spec.fits()
     }
 
     /// Whether every sample needs maps of its own.

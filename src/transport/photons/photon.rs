@@ -31,19 +31,23 @@ impl Photon {
     }
 
     /// What it brings of the light that leaves `vertex` towards the eye, on paths of at most `max_depth` edges:
-    /// times the density of the kernel, radiance.
+    /// times the density of the kernel, radiance. It lies at `offset` from the vertex; `None` where it lies on
+    /// another surface, or brings nothing.
     #[inline]
-    fn scattered(&self, vertex: &Vertex, max_depth: u32) -> Rgb {
-        if self.edges + vertex.edges > max_depth {
-            return Rgb::BLACK;
+    pub(in crate::transport) fn seen(
+        &self,
+        kernel: &Kernel,
+        vertex: &Vertex,
+        offset: Vec3,
+        max_depth: u32,
+    ) -> Option<Rgb> {
+        if self.edges + vertex.edges > max_depth || !kernel.accepts(vertex.hit, self.ng, offset) {
+            return None;
         }
         let (f_cos, _) = vertex.shading.eval_pdf(self.wi, Mode::Radiance);
         let lit = self.power * f_cos * (1.0 / vertex.hit.ng.dot(self.wi).abs());
         // Light along the surface brings nothing.
-        match lit.is_finite() {
-            true => lit,
-            false => Rgb::BLACK,
-        }
+        (lit.is_finite() && !lit.is_black()).then_some(lit)
     }
 
     /// Radiance that the photons of `map` around `vertex` send towards the eye, if one walk made them.
@@ -56,8 +60,8 @@ impl Photon {
     ) -> Rgb {
         let mut sum = Rgb::BLACK;
         map.around(vertex.hit.p, |photon, offset, d2| {
-            if kernel.accepts(vertex.hit, photon.ng, offset) {
-                sum += photon.scattered(vertex, max_depth) * kernel.eval(d2);
+            if let Some(lit) = photon.seen(kernel, vertex, offset, max_depth) {
+                sum += lit * kernel.eval(d2);
             }
         });
         sum

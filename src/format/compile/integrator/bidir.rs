@@ -91,7 +91,7 @@ pub fn check_camera(
 }
 
 /// The integrator inside all wrappers.
-fn innermost<'a>(props: &Props<'a>) -> Option<Props<'a>> {
+pub fn innermost<'a>(props: &Props<'a>) -> Option<Props<'a>> {
     let inner = props.child(Category::Integrator)?;
     match innermost(&inner) {
         Some(deeper) => Some(deeper),

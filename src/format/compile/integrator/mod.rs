@@ -5,6 +5,7 @@ mod layers;
 mod photons;
 
 pub use bidir::check_camera;
+pub use photons::check_memory;
 
 use super::{on_command_line, suggest};
 use crate::format::plugins::Category;

@@ -1,6 +1,9 @@
 //! Integrators that shoot photons.
 
-use crate::format::{Props, SceneError};
+use super::bidir::innermost;
+use crate::format::compile::on_command_line;
+use crate::format::{Overrides, Props, SceneError};
+use crate::render::Job;
 use crate::transport::{CombinedSpec, PathSpec, PhotonMapperSpec, PhotonSpec, Show};
 
 /// Bytes of what memory is asked for in.
@@ -63,4 +66,16 @@ pub fn photon_mapper(props: &Props, path: PathSpec) -> Result<PhotonMapperSpec, 
         caustic_lookup: lookup("caustic_lookup_size")?,
         memory: props.int("memory")? as u64 * MIB,
     })
+}
+
+/// That the photons of an iteration fit into the memory that they may take.
+pub fn check_memory(job: &Job, root: &Props, overrides: &Overrides) -> Result<(), SceneError> {
+    let Err(what) = job.fits() else {
+        return Ok(());
+    };
+    let error = match &overrides.integrator {
+        Some(name) => on_command_line("--integrator", name, what),
+        None => innermost(root).map_or_else(|| root.error(&what), |props| props.error(&what)),
+    };
+    Err(error.with_help("shoot fewer photons, or set \"memory\" of the integrator, in MiB"))
 }

@@ -1,0 +1,95 @@
+//! Integrators that walk from lights.
+
+use super::*;
+
+/// The error of an integrator, which stands on line 3.
+fn of(integrator: &str) -> String {
+    building(&format!("<sensor type='perspective'/>\n{integrator}"))
+}
+
+#[test]
+fn what_is_not_supported_says_what_to_do() {
+    says(
+        of("<integrator type='ppm'/>"),
+        r#"
+a.xml:3:13: integrator "ppm" is not supported
+  <integrator type='ppm'/>
+              ^
+  help: use the integrator "sppm", which shoots photons for every pass and keeps none"#,
+    );
+    for name in ["mlt", "pssmlt", "erpt"] {
+        let text = of(&format!("<integrator type='{name}'/>"));
+        let help = r#"help: luxel mutates no paths; use the integrator "bdpt" or "vcm""#;
+        assert!(text.contains(help), "{text}");
+    }
+    says(
+        of("<integrator type='sppm'><integer name='max_passes' value='8'/></integrator>"),
+        r#"
+a.xml:3:52: a number of passes in the integrator is not supported
+  <integrator type='sppm'><integer name='max_passes' value='8'/></integrator>
+                                                     ^
+  help: set the sampler's sample_count or --spp: a pass is a sample of each pixel"#,
+    );
+}
+
+#[test]
+fn settings_of_photons() {
+    says(
+        of("<integrator type='vcm'><float name='alpha' value='1'/></integrator>"),
+        r#"
+a.xml:3:44: "alpha" must be a number above 0 and below 1, not 1
+  <integrator type='vcm'><float name='alpha' value='1'/></integrator>
+                                             ^"#,
+    );
+    says(
+        of("<integrator type='sppm'><integer name='photon_count' value='0'/></integrator>"),
+        r#"
+a.xml:3:54: "photon_count" must be an integer of at least 1, not 0
+  <integrator type='sppm'><integer name='photon_count' value='0'/></integrator>
+                                                       ^"#,
+    );
+    says(
+        of("<integrator type='sppm'><float name='initial_radius' value='-1'/></integrator>"),
+        r#"
+a.xml:3:54: "initial_radius" must be a number of at least 0, not -1
+  <integrator type='sppm'><float name='initial_radius' value='-1'/></integrator>
+                                                       ^"#,
+    );
+    says(
+        of("<integrator type='bdpt'><float name='initial_radius' value='1'/></integrator>"),
+        r#"
+a.xml:3:32: unknown parameter "initial_radius" of integrator "bdpt"
+  <integrator type='bdpt'><float name='initial_radius' value='1'/></integrator>
+                                 ^
+  help: known are "max_depth", "rr_depth", "hide_emitters", "light_image", "sample_direct", "samples_per_pass", "timeout" and "block_size""#,
+    );
+}
+
+#[test]
+fn light_cannot_be_connected_to_a_meter() {
+    says(
+        building(
+            "<sensor type='radiancemeter'><film type='hdrfilm'><integer name='width' value='1'/>\
+             <integer name='height' value='1'/></film></sensor>\n<integrator type='ptracer'/>",
+        ),
+        r#"
+a.xml:3:13: the integrator "ptracer" cannot connect light to the sensor "radiancemeter"
+  <integrator type='ptracer'/>
+              ^
+  help: use "bdpt", "vcm" or "path", which also walk from the sensor"#,
+    );
+    let asked = Overrides {
+        integrator: Some("ptracer".into()),
+        ..Overrides::default()
+    };
+    let body = "<sensor type='distant'><film type='hdrfilm'><integer name='width' value='1'/>\
+                <integer name='height' value='1'/></film></sensor>\n<integrator type='path'/>\n<shape type='sphere'/>";
+    says(
+        building_in(Path::new("nowhere"), body, &asked),
+        r#"
+command line:1:14: the integrator "ptracer" cannot connect light to the sensor "distant"
+  --integrator ptracer
+               ^
+  help: use "bdpt", "vcm" or "path", which also walk from the sensor"#,
+    );
+}
