@@ -8,6 +8,7 @@ use super::tree::LightBounds;
 use super::{Emitter, Item, Lights, NO_ITEM, Radiance, Surface, What};
 use super::{moving, textured};
 use crate::geom::{Geometry, PlaceId, ShapeId, World};
+use crate::math::warp::Tabulated2;
 use crate::math::{Aabb, Motion, PI, Rgb, Vec3};
 
 /// By shape, where it stands: empty where all stand as they are.
@@ -133,11 +134,7 @@ impl Lights {
                 };
                 self.add_surface(*shape, g, Radiance::Textured(id));
                 for spread in textured::spread(*shape, g, radiance) {
-                    let table = spread.table.map(|table| {
-                        self.tables.push(table);
-                        self.tables.len() as u32 - 1
-                    });
-                    let part = spread.part;
+                    let (part, table) = (spread.part, self.add_table(spread.table));
                     let what = What::Textured { part, table };
                     self.add_part(id, g, part, what, PI * spread.mean, bounds);
                 }
@@ -149,11 +146,17 @@ impl Lights {
                 // It belongs to an emitter, but no ray sees its light.
                 self.add_surface(*shape, g, Radiance::Constant(Rgb::BLACK));
                 for spread in textured::spread(*shape, g, exitance) {
-                    let part = spread.part;
-                    self.add_part(id, g, part, What::Beam { part }, spread.mean, bounds);
+                    let (part, table) = (spread.part, self.add_table(spread.table));
+                    let what = What::Beam { part, table };
+                    self.add_part(id, g, part, what, spread.mean, bounds);
                 }
             }
         }
+    }
+
+    fn add_table(&mut self, table: Option<Tabulated2>) -> Option<u32> {
+        self.tables.push(table?);
+        Some(self.tables.len() as u32 - 1)
     }
 
     fn add_point(&mut self, emitter: u32, mut b: LightBounds, bounds: &mut Vec<LightBounds>) {

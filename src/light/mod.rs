@@ -156,8 +156,10 @@ enum What {
         part: Part,
         table: Option<u32>,
     },
+    /// The same; light leaves by the table, connections need none.
     Beam {
         part: Part,
+        table: Option<u32>,
     },
     /// A point, spot or projector.
     Point,
@@ -352,7 +354,7 @@ impl Lights {
                 let (towards, at) = textured::sample(&part, g, self.table(table), from.p, u)?;
                 (towards, self.textured(item.emitter, &at))
             }
-            What::Beam { part } => {
+            What::Beam { part, .. } => {
                 let g = geoms.get(part.shape().0 as usize)?;
                 let foot = beam::foot(&part, g, from)?;
                 let le = self.textured(item.emitter, &foot.at) * (foot.factor / prob);

@@ -95,7 +95,7 @@ impl Lights {
             return None;
         }
         match what {
-            What::Part { part, .. } | What::Textured { part, .. } | What::Beam { part } => {
+            What::Part { part, .. } | What::Textured { part, .. } | What::Beam { part, .. } => {
                 Some(Moved::new(self.motion(part.shape())?, from.time))
             }
             What::Point => None,

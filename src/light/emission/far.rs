@@ -65,8 +65,26 @@ impl Cover {
         p
     }
 
-    /// Where the line through `p` along `d` is still outside of the box and of every sphere of radius
-    /// `beyond` around a point of it.
+    /// Whether the line through `p` along `d` meets the box, to rounding.
+    fn crosses(&self, p: DVec3, d: DVec3) -> bool {
+        let half = self.half + (self.radius - self.half.length());
+        let o = p - self.center;
+        let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
+        for i in 0..3 {
+            if d[i] == 0.0 {
+                if o[i].abs() > half[i] {
+                    return false;
+                }
+            } else {
+                let reach = half[i].copysign(d[i]);
+                near = near.max((-reach - o[i]) / d[i]);
+                far = far.min((reach - o[i]) / d[i]);
+            }
+        }
+        near <= far
+    }
+
+    /// Where the line through `p` along `d` has not come to the sphere around the box yet.
     fn before(&self, p: DVec3, d: DVec3) -> Vec3 {
         (p - d * ((p - self.center).dot(d) + self.radius)).as_vec3()
     }
@@ -96,7 +114,8 @@ impl Aim {
         (self.share() > 0.0 && shadow > 0.0 && shadow < section).then_some(shadow)
     }
 
-    /// A point that light along `d` passes through, and the target it was aimed at.
+    /// A point that light along `d` passes through, and the target it was aimed at. `None` where that is not
+    /// in the scene.
     fn passing(
         &self,
         cover: &Cover,
@@ -114,7 +133,7 @@ impl Aim {
         let disk = warp::concentric_disk(u.direction).as_dvec2() * f64::from(target.radius);
         let (s, t) = d.any_orthonormal_pair();
         let p = target.center.as_dvec3() + s * disk.x + t * disk.y;
-        Some((p, Some(index)))
+        cover.crosses(p, d).then_some((p, Some(index)))
     }
 }
 

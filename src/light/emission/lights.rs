@@ -25,7 +25,9 @@ impl Lights {
         let item = self.items.get(index)?;
         match &item.what {
             What::Point => self.sample_point_emission(item.emitter, index as u32, prob, aim, u),
-            What::Beam { part } => self.sample_beam_emission(geoms, part, index as u32, prob, u),
+            What::Beam { part, table } => {
+                self.sample_beam_emission(geoms, (part, *table), index as u32, prob, u)
+            }
             what => self.sample_surface_emission(geoms, (what, item.emitter), prob, aim, u),
         }
     }
@@ -74,7 +76,10 @@ impl Lights {
         let item = self.items.get(index)?;
         match &item.what {
             What::Point => self.point_pdf(item.emitter, index, aim, -sample.wi),
-            What::Beam { part } => Some(self.beam_pdf(geoms, part, index)),
+            What::Beam { part, .. } => {
+                let met = self.end_of(geoms, part, from, sample)?;
+                self.beam_pdf(geoms, index, &met)
+            }
             What::Part { part, .. } | What::Textured { part, .. } => {
                 let met = self.end_of(geoms, part, from, sample)?;
                 self.surface_pdf(geoms, index, aim, &met)

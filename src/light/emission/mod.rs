@@ -5,6 +5,7 @@
 //! connected to the same start ([`Lights::pdf_connection`]).
 
 mod aim;
+mod around;
 mod far;
 mod lights;
 mod sources;

@@ -6,7 +6,7 @@
 //! same in all of them.
 
 use super::{Aim, Densities, Emission, EmissionNumbers, Source};
-use crate::geom::{Geometry, Hit, Ray, ShapeId};
+use crate::geom::{Geometry, Hit, Ray};
 use crate::light::local::Part;
 use crate::light::moving::Moved;
 use crate::light::{Lights, What, place_of, textured};
@@ -68,12 +68,12 @@ impl Lights {
     pub(super) fn sample_beam_emission(
         &self,
         geoms: &[Geometry],
-        part: &Part,
+        (part, table): (&Part, Option<u32>),
         item: u32,
         prob: f64,
         u: &EmissionNumbers,
     ) -> Option<Emission> {
-        let mut start = self.start(geoms, part, None, u)?;
+        let mut start = self.start(geoms, part, self.table(table), u)?;
         let hit = &mut start.hit;
         hit.wo = hit.ng * hit.ng.dot(hit.frame.n).signum();
         let emitter = self.items.get(item as usize)?.emitter;
@@ -135,13 +135,37 @@ impl Lights {
         met: &Hit,
     ) -> Option<Densities> {
         let what = &self.items.get(index)?.what;
-        let (part, table) = match *what {
-            What::Part { part, .. } => (part, None),
-            What::Textured { part, table } => (part, self.table(table)),
+        let density = match what {
+            What::Part { .. } | What::Textured { .. } => self.area_density(geoms, what, met)?,
             What::Beam { .. } | What::Point => return None,
         };
+        let start = self.sources.prob_of_item(index) * density;
+        let onward = aim.pdf(met.p, &outlook(met), met.wo, unaimed_pdf(met, met.wo));
+        Some(surface_densities(start, onward, met))
+    }
+
+    /// Densities of the beam that leaves `met`, a point of the surface of item `index`.
+    pub(super) fn beam_pdf(
+        &self,
+        geoms: &[Geometry],
+        index: usize,
+        met: &Hit,
+    ) -> Option<Densities> {
+        let what = &self.items.get(index)?.what;
+        let across = self.area_density(geoms, what, met)?;
+        Some(beam_densities(self.sources.prob_of_item(index), across))
+    }
+
+    /// Density per unit of area in the world with which light of an item starts at `met`.
+    fn area_density(&self, geoms: &[Geometry], what: &What, met: &Hit) -> Option<f64> {
+        let (part, table) = match *what {
+            What::Part { part, .. } => (part, None),
+            What::Textured { part, table } | What::Beam { part, table } => {
+                (part, self.table(table))
+            }
+            What::Point => return None,
+        };
         let g = geoms.get(part.shape().0 as usize)?;
-        let area = part.area(g);
         let (p, scale) = match self.moved(what, met) {
             Some(moved) => (
                 Moved::into(&moved, met.p),
@@ -153,16 +177,7 @@ impl Lights {
             Some(table) => f64::from(textured::table_density(&part, g, table, p, &place_of(met))),
             None => 1.0,
         };
-        let start = self.sources.prob_of_item(index) * density / (area * scale);
-        let onward = aim.pdf(met.p, &outlook(met), met.wo, unaimed_pdf(met, met.wo));
-        Some(surface_densities(start, onward, met))
-    }
-
-    /// Density per unit of area across the ray with which a beam leaves a part.
-    pub(super) fn beam_pdf(&self, geoms: &[Geometry], part: &Part, index: usize) -> Densities {
-        let ShapeId(shape) = part.shape();
-        let area = geoms.get(shape as usize).map_or(0.0, |g| part.area(g));
-        beam_densities(self.sources.prob_of_item(index), 1.0 / area)
+        Some(density / (part.area(g) * scale))
     }
 }
 

@@ -126,7 +126,7 @@ impl<'a> Engine<'a> {
         Engine {
             spec,
             setting,
-            aim: Aim::default(),
+            aim: setting.scene.aim_partly_at_caustics(),
             max_depth: spec.max_depth.unwrap_or(UNBOUNDED),
             techniques,
             walks,

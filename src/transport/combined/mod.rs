@@ -89,9 +89,13 @@ impl CombinedSpec {
                 "a surface has a delta lobe, and another receives its light",
             ),
         };
+        let aimed = match self.shoots(scene) && scene.aim_at_caustics().share > 0.0 {
+            true => ", aimed at what throws them",
+            false => "",
+        };
         PlanEntry {
             subject,
-            decision: decision.to_string(),
+            decision: format!("{decision}{aimed}"),
             reason: reason.to_string(),
         }
     }
@@ -119,7 +123,7 @@ impl<'a> Combined<'a> {
         Combined {
             spec,
             setting,
-            aim: Aim::default(),
+            aim: setting.scene.aim_at_caustics(),
             count: spec.photons.count.unwrap_or(pixels),
             radius,
         }

@@ -88,7 +88,11 @@ impl PhotonMapper<'_> {
             setting: self.setting,
             walk: LightWalk {
                 scene,
-                aim: &self.aim,
+                aim: if specular_only {
+                    &self.aim
+                } else {
+                    &self.everywhere
+                },
                 techniques: Techniques::default(),
                 // One edge is left for the eye.
                 max_edges: max_depth.saturating_sub(1),

@@ -109,7 +109,9 @@ impl PhotonMapperSpec {
 pub struct PhotonMapper<'a> {
     spec: &'a PhotonMapperSpec,
     setting: Setting<'a>,
+    /// Of caustic photons.
     aim: Aim,
+    everywhere: Aim,
     /// Those of a still scene, once made.
     still: OnceLock<Arc<Maps>>,
 }
@@ -119,7 +121,8 @@ impl<'a> PhotonMapper<'a> {
         PhotonMapper {
             spec,
             setting,
-            aim: Aim::default(),
+            aim: setting.scene.aim_at_caustics(),
+            everywhere: Aim::default(),
             still: OnceLock::new(),
         }
     }
