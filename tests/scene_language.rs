@@ -1,6 +1,6 @@
 //! What a scene means: parameters, includes, references, upgrades, defaults.
 
-use luxel::format::{self, Category, FloatOrTexture, Props, RgbOrTexture, SceneDesc};
+use luxel::format::{self, Category, FloatOrTexture, Overrides, Props, RgbOrTexture, SceneDesc};
 use luxel::math::{DVec3, Rgb, Transform};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -320,4 +320,59 @@ proptest! {
             prop_assert!(mesh.indices.iter().flatten().all(|i| *i < count));
         }
     }
+}
+
+#[test]
+fn integrators_of_mitsuba_0_6_keep_their_settings() {
+    use luxel::transport::{BidirSpec, IntegratorSpec, Method, PhotonSpec};
+    let of = |integrator: &str| {
+        let xml = format!(
+            "<scene version='0.6.0'><sensor type='perspective'/>{integrator}\
+             <shape type='sphere'><bsdf type='diffuse'/></shape></scene>"
+        );
+        let desc = format::load_str("a.xml", &xml, "nowhere".as_ref(), &[]).unwrap();
+        format::compile(&desc, &Overrides::default())
+            .unwrap_or_else(|e| panic!("{e}"))
+            .job
+            .integrator
+    };
+    let sppm = of(
+        "<integrator type='sppm'><integer name='maxDepth' value='7'/><integer name='rrDepth' value='3'/>
+         <integer name='photonCount' value='1000'/><float name='initialRadius' value='0.5'/>
+         <float name='alpha' value='0.6'/><integer name='maxPasses' value='-1'/>
+         <integer name='granularity' value='500'/></integrator>",
+    );
+    let expected = BidirSpec {
+        method: Method::Sppm,
+        max_depth: Some(7),
+        rr_depth: 3,
+        hide_emitters: false,
+        light_image: true,
+        photons: PhotonSpec {
+            count: Some(1000),
+            radius: Some(0.5),
+            alpha: 0.6,
+            ..PhotonSpec::default()
+        },
+    };
+    assert_eq!(sppm, IntegratorSpec::Bidirectional(expected));
+    let bdpt = of(
+        "<integrator type='bdpt'><boolean name='lightImage' value='false'/>
+         <boolean name='sampleDirect' value='true'/></integrator>",
+    );
+    let expected = BidirSpec {
+        method: Method::Bdpt,
+        max_depth: None,
+        rr_depth: 5,
+        hide_emitters: false,
+        light_image: false,
+        photons: PhotonSpec::default(),
+    };
+    assert_eq!(bdpt, IntegratorSpec::Bidirectional(expected));
+    // Of a radius of 0 Mitsuba makes one of its own, and so does luxel.
+    let sppm = of("<integrator type='sppm'><float name='initialRadius' value='0'/></integrator>");
+    let IntegratorSpec::Bidirectional(spec) = sppm else {
+        panic!("{sppm:?}");
+    };
+    assert_eq!(spec.photons, PhotonSpec::default());
 }

@@ -276,16 +276,21 @@ impl Scene {
         }
     }
 
-    /// An aim at all that can throw a caustic: light that meets none of it first is not emitted. Where aiming does
-    /// not pay, light is emitted everywhere.
-    pub fn aim_at_caustics(&self) -> Aim {
+    /// An aim, where that pays, of a share of the light at all that can throw a caustic.
+    pub fn aim_partly_at_caustics(&self) -> Aim {
         let specular = |shape: &ShapeId| {
             let material = self.surfaces[shape.0 as usize];
             self.materials[material.0 as usize].is_specular()
         };
         let shapes = (0..self.surfaces.len() as u32).map(ShapeId);
         let shapes: Vec<ShapeId> = shapes.filter(specular).collect();
-        let aim = Aim::around(&self.world, &shapes);
+        Aim::around(&self.world, &shapes)
+    }
+
+    /// An aim at all that can throw a caustic: light that meets none of it first is not emitted. Where aiming does
+    /// not pay, light is emitted everywhere.
+    pub fn aim_at_caustics(&self) -> Aim {
+        let aim = self.aim_partly_at_caustics();
         Aim {
             share: if aim.share > 0.0 { 1.0 } else { 0.0 },
             ..aim

@@ -220,7 +220,7 @@ impl LightWalk<'_> {
                         true => mis::power(pdf.start_per_sr(dist2) / start),
                         false => 0.0,
                     },
-                    reverse_unmerged: 0.0,
+                    reverse_caustic: 0.0,
                     cut: match self.techniques.next_event {
                         true => mis::power(connected() / start),
                         false => 0.0,
@@ -241,19 +241,28 @@ impl LightWalk<'_> {
                 .seen_from(hit, &vertex.shading, vertex.u_material, sample.wi);
             seen.eval_pdf(hit.wo, Mode::Radiance).1
         };
-        // Light that was not scattered yet is not merged: next-event estimation does that better.
-        let merges = vertex.scattered > 0;
         vertex.state.leave(
-            &self.techniques,
             sample.density,
             back,
             f64::from(hit.ng.dot(sample.wi).abs()),
-            merges,
+            self.techniques.connection,
+            // The eye's walk comes from where this goes, so it is scattered before.
+            [vertex.merging(&self.techniques, true), 0.0],
         )
     }
 }
 
 impl LightVertex {
+    /// What merging here counts for with an eye's walk that was scattered before, or not. Light that was not
+    /// scattered is not merged: next-event estimation does that better.
+    #[inline]
+    pub fn merging(&self, techniques: &Techniques, later: bool) -> f64 {
+        match self.scattered {
+            0 => 0.0,
+            _ => techniques.merging(self.specular, later),
+        }
+    }
+
     /// Share of the light scattered into the unit vector `wi`, per steradian: times the power and over the
     /// squared distance, the irradiance on what is at right angles to `wi` there. Also the density per
     /// steradian with which a walk from the eye that comes against `wi` would have gone to where the light

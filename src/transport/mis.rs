@@ -41,10 +41,26 @@ pub struct Techniques {
     pub merging: f64,
 }
 
+/// Share of its density that gathering photons of a caustic counts with where the eye's walk was scattered
+/// before. Such a walk hits a caustic by chance, and then finds many photons at once: they are no
+/// independent samples, and the heuristic must not take them for such (Grittmann et al. 2021,
+/// "Correlation-aware multiple importance sampling for bidirectional rendering algorithms").
+const LATER_CAUSTIC: f64 = 0.1;
+
 impl Techniques {
     /// Whether there is more than one, so that weights must be known.
     pub fn weighs(&self) -> bool {
         self.emission || self.next_event || self.connection || self.splats > 0.0
+    }
+
+    /// What merging counts for with light that came by delta lobes alone, or not, and an eye's walk that
+    /// meets its first vertex without such a lobe, or a later one.
+    #[inline]
+    pub fn merging(&self, caustic: bool, later: bool) -> f64 {
+        match caustic && later {
+            true => self.merging * LATER_CAUSTIC,
+            false => self.merging,
+        }
     }
 }
 
@@ -55,8 +71,8 @@ pub struct State {
     pub pdf: f64,
     /// What the power of the density (per steradian) of going back from here is multiplied with.
     pub reverse: f64,
-    /// The same without merging at the vertex before.
-    pub reverse_unmerged: f64,
+    /// The same if light comes by delta lobes alone to the last vertex with any other.
+    pub reverse_caustic: f64,
     /// Density, relative to this walk's, of the cut just before this vertex, if it has a lobe that is not a
     /// delta one.
     pub cut: f64,
@@ -68,7 +84,10 @@ pub struct Leg {
     /// Density per steradian of the direction.
     onward: f64,
     bracket: f64,
-    bracket_unmerged: f64,
+    /// If light comes by delta lobes alone to the last vertex with any other: by at least one of these, and by
+    /// those so far.
+    bracket_caustic: f64,
+    bracket_met: f64,
     cos: f64,
     cut: f64,
 }
@@ -88,36 +107,36 @@ impl State {
     }
 
     /// Goes on with density `onward` in a direction at cosine `cos`; `back` is the density per steradian of
-    /// going back. `merges` tells whether photons may be merged here.
+    /// going back. `merging` is what merging here counts for: with light that is scattered by other lobes than
+    /// delta ones before it arrives, and with that of caustics.
     #[inline]
     pub fn leave(
         &self,
-        techniques: &Techniques,
         onward: Density,
         back: impl FnOnce() -> f32,
         cos: f64,
-        merges: bool,
+        cut: bool,
+        merging: [f64; 2],
     ) -> Leg {
         match onward {
-            Density::Delta => {
-                let bracket = self.reverse / power(self.pdf);
-                Leg {
-                    onward: 1.0,
-                    bracket,
-                    bracket_unmerged: bracket,
-                    cos,
-                    cut: 0.0,
-                }
-            }
+            Density::Delta => Leg {
+                onward: 1.0,
+                bracket: self.reverse / power(self.pdf),
+                bracket_caustic: self.reverse_caustic / power(self.pdf),
+                bracket_met: self.reverse_caustic / power(self.pdf),
+                cos,
+                cut: 0.0,
+            },
             Density::PerSr(pdf) => {
-                let merging = if merges { techniques.merging } else { 0.0 };
-                let bracket_unmerged = self.sum(f64::from(back())) / power(self.pdf);
+                let unmerged = self.sum(f64::from(back())) / power(self.pdf);
                 Leg {
                     onward: f64::from(pdf),
-                    bracket: bracket_unmerged + power(merging),
-                    bracket_unmerged,
+                    bracket: unmerged + power(merging[0]),
+                    bracket_caustic: unmerged + power(merging[1]),
+                    // Straight from an emitter, light is not merged.
+                    bracket_met: unmerged,
                     cos,
-                    cut: if techniques.connection { 1.0 } else { 0.0 },
+                    cut: if cut { 1.0 } else { 0.0 },
                 }
             }
         }
@@ -126,11 +145,11 @@ impl State {
 
 impl Leg {
     /// Sum over all techniques but connecting to the emitter, relative to a walk that arrives at a point where
-    /// light is emitted with the density `pdf`. Straight from there light is not merged.
+    /// light is emitted with the density `pdf`.
     #[inline]
     pub fn emitted(&self, pdf: &EmissionPdf) -> f64 {
         let ray = f64::from(pdf.start) * f64::from(pdf.onward) * self.cos;
-        power(ray / (self.onward * f64::from(pdf.cos))) * self.bracket_unmerged
+        power(ray / (self.onward * f64::from(pdf.cos))) * self.bracket_met
     }
 
     /// Arrives after the squared distance `dist2` at a surface under the cosine `cos`.
@@ -140,7 +159,7 @@ impl Leg {
         State {
             pdf: self.onward * cos / dist2,
             reverse: back * self.bracket,
-            reverse_unmerged: back * self.bracket_unmerged,
+            reverse_caustic: back * self.bracket_caustic,
             cut: self.cut,
         }
     }

@@ -203,7 +203,8 @@ impl<'a> Transport<'a> {
         match &self.work {
             Work::Combined(engine) => engine.fits(),
             Work::PhotonMapper(engine) => engine.fits(),
-            Work::Path(_) | Work::Direct(_) | Work::Bidirectional(_) => Ok(()),
+            Work::Bidirectional(engine) => engine.fits(),
+            Work::Path(_) | Work::Direct(_) => Ok(()),
         }
     }
 

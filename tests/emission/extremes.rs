@@ -240,7 +240,12 @@ fn odd_aims_do_no_harm() {
                 // Rays that are aimed at next to nothing carry next to nothing.
                 let within = 6.0 * (sum.stderr() + free.stderr()) + 1e-5 * free.mean;
                 let off = (sum.mean - free.mean).abs();
-                assert!(off < within, "{}, {radius}: {}", stage.name, sum.mean);
+                let (name, mean) = (stage.name, sum.mean);
+                assert!(
+                    off < within,
+                    "{name}, {radius}, {share}: {mean} and not {}",
+                    free.mean
+                );
             }
         }
     }

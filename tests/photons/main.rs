@@ -93,8 +93,8 @@ fn ball(x: f64, material: &str) -> String {
 
 const GLASS: &str = r#"<bsdf type="dielectric"/>"#;
 const MIRROR: &str = r#"<bsdf type="conductor"/>"#;
-const MASK: &str =
-    r#"<bsdf type="mask"><float name="opacity" value="0.4"/><bsdf type="conductor"/></bsdf>"#;
+const MASK: &str = r#"<bsdf type="mask"><float name="opacity" value="0.4"/>
+    <bsdf type="twosided"><bsdf type="conductor"/></bsdf></bsdf>"#;
 
 #[test]
 fn a_closed_box_absorbs_all_and_stores_a_geometric_series() {
@@ -146,7 +146,7 @@ fn books_balance_in_open_scenes_and_where_walks_are_cut_short() {
 }
 
 #[test]
-fn glass_and_the_smallest_share_of_light_lose_nothing() {
+fn glass_loses_nothing_and_stores_nothing() {
     let compiled = compile(&scene(-1, &camera(8, 40.0), &(ball(-0.5, GLASS) + LIGHT)));
     let aim = Aim::default();
     let (photons, tally) = shoot(&compiled, &aim, 20_000).trace(&mut Ledger::default(), power);
@@ -290,10 +290,10 @@ fn footprint_is_the_size_of_a_pixel_on_what_receives() {
         let size = |content: &str| footprint(&setting(&compile(&scene(-1, &view, content))));
         let white = size(&wall.replace("{}", ""));
         let expected = 2.0 * 4.0 * (20.0 / 180.0 * PI).tan() / 64.0 * scale;
-        // Of the median pixel; those at the rim see a little further.
+        // The middle of the picture; at its rim lines of sight meet the wall at cos >= 0.89.
         let ratio = white / expected;
         assert!(
-            (0.99..1.2).contains(&ratio),
+            (0.94..1.001).contains(&ratio),
             "{scale:e}: {white} {expected}"
         );
         let mirror = size(&wall.replace("{}", MIRROR));

@@ -23,6 +23,14 @@ a.xml:3:13: integrator "ppm" is not supported
         assert!(text.contains(help), "{text}");
     }
     says(
+        of("<integrator type='bdpt'><boolean name='sample_direct' value='false'/></integrator>"),
+        r#"
+a.xml:3:55: bidirectional path tracing without samples of emitters is not supported
+  <integrator type='bdpt'><boolean name='sample_direct' value='false'/></integrator>
+                                                        ^
+  help: leave "sample_direct" out: each technique weighs most where it is good"#,
+    );
+    says(
         of("<integrator type='sppm'><integer name='max_passes' value='8'/></integrator>"),
         r#"
 a.xml:3:52: a number of passes in the integrator is not supported
@@ -30,6 +38,21 @@ a.xml:3:52: a number of passes in the integrator is not supported
                                                      ^
   help: set the sampler's sample_count or --spp: a pass is a sample of each pixel"#,
     );
+}
+
+#[test]
+fn memory_for_photons() {
+    let body = "<sensor type='perspective'/>\n\
+        <integrator type='vcm'><integer name='photon_count' value='100000000'/><integer name='memory' value='1'/></integrator>\n\
+        <shape type='sphere'><bsdf type='diffuse'/></shape>\n\
+        <shape type='sphere'><float name='radius' value='9'/><boolean name='flip_normals' value='true'/>\
+        <bsdf type='diffuse'/></shape>\n\
+        <emitter type='point'><point name='position' x='3' y='0' z='0'/></emitter>";
+    let text = building(body);
+    let start = "a.xml:3:13: photon_count 100000000 makes about ";
+    assert!(text.starts_with(start), "{text}");
+    let end = "help: shoot fewer photons, or set \"memory\" of the integrator, in MiB";
+    assert!(text.ends_with(end), "{text}");
 }
 
 #[test]

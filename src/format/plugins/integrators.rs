@@ -74,7 +74,7 @@ const GRANULARITY: Param = Param::int(
 const LIGHT_IMAGE: Param = Param::bool(
     "light_image",
     true,
-    "Connect walks of light to the camera too, where the sensor can be connected to; only true.",
+    "Connect walks of light to the camera too, where the sensor can be connected to; without, caustics of point lights are lost.",
 );
 const SAMPLE_DIRECT: Param = Param::bool(
     "sample_direct",

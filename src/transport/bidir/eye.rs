@@ -53,6 +53,7 @@ impl EyeWalk<'_> {
         let (mut lo, mut throughput) = (Rgb::BLACK, Rgb::WHITE);
         let (mut seen, mut straight) = (false, true);
         let mut eta2 = 1.0;
+        let mut later = false;
         let mut last: Option<Last> = None;
         for depth in 0..max_depth {
             let met = match straight {
@@ -98,6 +99,7 @@ impl EyeWalk<'_> {
                 u_material,
                 state: self.arrive(&ray, &hit, last.as_ref()),
                 edges: depth + 1,
+                later,
             };
             if !shading.bsdf.is_delta() {
                 let lit = self.join(&vertex, throughput, &u, ledger);
@@ -123,12 +125,13 @@ impl EyeWalk<'_> {
                 break;
             }
             let leg = vertex.state.leave(
-                &self.techniques,
                 sample.density,
                 || vertex.pdf_back(scene, sample.wi),
                 f64::from(hit.ng.dot(sample.wi).abs()),
-                true,
+                self.techniques.connection,
+                [false, true].map(|caustic| self.techniques.merging(caustic, later)),
             );
+            later |= sample.density != Density::Delta;
             ray = hit.spawn(sample.wi);
             ledger.rays.indirect += 1;
             last = Some(Last {

@@ -23,6 +23,8 @@ pub struct Photon {
     power: Rgb,
     /// Edges behind it.
     edges: u32,
+    /// Whether it came by delta lobes alone.
+    caustic: bool,
     /// Weight of the techniques that cut the path just before the photon, and of those before that, over the
     /// power of the density of going back; relative to merging here.
     cut: f32,
@@ -38,6 +40,7 @@ impl Photon {
             ng: vertex.hit.ng,
             power: vertex.power,
             edges: vertex.edges,
+            caustic: vertex.specular,
             cut: ratio(vertex.state.cut, here),
             reverse: ratio(vertex.state.reverse, here),
         }
@@ -60,6 +63,8 @@ pub struct EyeVertex {
     pub state: State,
     /// From the camera to here.
     pub edges: u32,
+    /// Whether the walk was scattered by a lobe before that is no delta one.
+    pub later: bool,
 }
 
 impl EyeVertex {
@@ -120,7 +125,7 @@ impl Engine<'_> {
         // The density with which the camera would have met the vertex, relative to all walks of light.
         let cos = f64::from(hit.ng.dot(sight.wi).abs());
         let met = f64::from(sight.importance) * cos / self.walks;
-        let merging = merging_at(techniques, vertex);
+        let merging = vertex.merging(techniques, false);
         let rivals = match techniques.emission {
             true => mis::power(met) * vertex.state.bracket(f64::from(back), merging),
             false => 0.0,
@@ -131,14 +136,6 @@ impl Engine<'_> {
             film: sight.film,
             value,
         });
-    }
-}
-
-/// What merging at a vertex of light counts for: light straight from an emitter is not merged.
-fn merging_at(techniques: &Techniques, vertex: &LightVertex) -> f64 {
-    match vertex.scattered {
-        0 => 0.0,
-        _ => techniques.merging,
     }
 }
 
@@ -234,12 +231,13 @@ impl EyeWalk<'_> {
         let (_, light_pdf) = light.shading.eval_pdf(-wi, Mode::Importance);
         let there = f64::from(pdf) * cos_there / dist2;
         let here = f64::from(light_pdf) * cos_here / dist2;
-        let merging = merging_at(&self.techniques, light);
+        let merging = light.merging(&self.techniques, true);
         let rivals = mis::power(there) * light.state.bracket(f64::from(light_back), merging)
             + mis::power(here)
-                * vertex
-                    .state
-                    .bracket(f64::from(back), self.techniques.merging);
+                * vertex.state.bracket(
+                    f64::from(back),
+                    self.techniques.merging(false, vertex.later),
+                );
         let weight = f64::from(seen) / (dist2 * (1.0 + rivals));
         f_cos * light.power * scattered * weight as f32
     }
@@ -248,7 +246,14 @@ impl EyeWalk<'_> {
     fn merge(&self, vertex: &EyeVertex, photons: &Photons) -> Rgb {
         let scene = self.engine.setting.scene;
         let hit = &vertex.hit;
-        let here = mis::power(vertex.state.pdf * self.techniques.merging);
+        let here = |caustic| {
+            let merging = self.techniques.merging(caustic, vertex.later);
+            mis::power(vertex.state.pdf * merging)
+        };
+        let here = [here(false), here(true)];
+        let of_caustic =
+            mis::power(self.techniques.merging / self.techniques.merging(true, vertex.later))
+                as f32;
         let mut sum = Rgb::BLACK;
         photons.map.around(hit.p, |photon, offset, _| {
             if photon.edges + vertex.edges > self.engine.max_depth
@@ -260,8 +265,14 @@ impl EyeWalk<'_> {
             if f_cos.is_black() {
                 return;
             }
-            let behind = photon.cut + pdf * pdf * photon.reverse;
-            let ahead = ratio(vertex.state.sum(f64::from(back)), here);
+            let mut behind = photon.cut + pdf * pdf * photon.reverse;
+            if photon.caustic {
+                behind *= of_caustic;
+            }
+            let ahead = ratio(
+                vertex.state.sum(f64::from(back)),
+                here[usize::from(photon.caustic)],
+            );
             let cos = hit.ng.dot(photon.wi).abs();
             sum += photon.power * f_cos * (1.0 / (cos * (1.0 + behind + ahead)));
         });

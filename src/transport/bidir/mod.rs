@@ -8,7 +8,7 @@
 mod eye;
 mod join;
 
-use super::light_walk::LightWalk;
+use super::light_walk::{LightVertex, LightWalk};
 use super::mis::Techniques;
 use super::path::UNBOUNDED;
 use super::photons::{self, Kernel, KernelShape, PhotonMap, Shoot};
@@ -70,6 +70,9 @@ pub struct BidirSpec {
     /// Edges from which on Russian roulette may end the eye's walk.
     pub rr_depth: u32,
     pub hide_emitters: bool,
+    /// Whether walks of light are connected to the camera, by methods that know other ways to it. Without, what
+    /// only they find is lost: the caustics of point lights.
+    pub light_image: bool,
     pub photons: PhotonSpec,
 }
 
@@ -103,6 +106,7 @@ impl<'a> Engine<'a> {
         let walks = pixels as f64;
         let splats = match spec.method {
             Method::Sppm => 0.0,
+            Method::Bdpt | Method::Vcm if !spec.light_image => 0.0,
             _ if setting.camera.can_be_connected() => walks,
             _ => 0.0,
         };
@@ -122,7 +126,7 @@ impl<'a> Engine<'a> {
         Engine {
             spec,
             setting,
-            aim: Aim::default(),
+            aim: setting.scene.aim_partly_at_caustics(),
             max_depth: spec.max_depth.unwrap_or(UNBOUNDED),
             techniques,
             walks,
@@ -148,6 +152,43 @@ impl<'a> Engine<'a> {
         photons::reduced(self.radius, self.spec.photons.alpha, number)
     }
 
+    /// With photons gathered from a disk of `radius`.
+    fn techniques_within(&self, radius: f32) -> Techniques {
+        let area = PI * radius * radius;
+        Techniques {
+            merging: self.photons as f64 * f64::from(area),
+            ..self.techniques
+        }
+    }
+
+    fn shoot(&self, number: u64, time: f32, techniques: Techniques) -> Shoot<'_> {
+        Shoot {
+            setting: self.setting,
+            walk: self.light_walk(techniques),
+            count: self.photons,
+            iteration: number,
+            time,
+        }
+    }
+
+    /// What is kept of a vertex of light: nothing of light straight from an emitter, which is never merged.
+    fn photon(&self, vertex: &LightVertex, techniques: &Techniques) -> Option<Photon> {
+        (vertex.scattered > 0 && self.setting.scene.receives(&vertex.hit))
+            .then(|| Photon::new(vertex, techniques.merging))
+    }
+
+    /// Whether the photons of an iteration fit into the memory that they may take; if not, what is wrong.
+    pub fn fits(&self) -> Result<(), String> {
+        if !self.spec.method.merges() {
+            return Ok(());
+        }
+        let techniques = self.techniques_within(self.radius(0));
+        let shoot = self.shoot(0, 0.0, techniques);
+        shoot.check(self.spec.photons.memory, "photon_count", |vertex| {
+            self.photon(vertex, &techniques)
+        })
+    }
+
     /// Begins an iteration: shoots its photons.
     pub fn begin(&self, number: u64, ledger: &mut Ledger) -> Iteration {
         if !self.spec.method.merges() {
@@ -155,23 +196,10 @@ impl<'a> Engine<'a> {
         }
         let time = self.setting.common_time(number);
         let radius = self.radius(number);
-        let area = PI * radius * radius;
-        let techniques = Techniques {
-            merging: self.photons as f64 * f64::from(area),
-            ..self.techniques
-        };
-        let scene = self.setting.scene;
-        let shoot = Shoot {
-            setting: self.setting,
-            walk: self.light_walk(techniques),
-            count: self.photons,
-            iteration: number,
-            time: time.unwrap_or(0.0),
-        };
-        let (found, _) = shoot.trace(ledger, |vertex| {
-            (vertex.scattered > 0 && scene.receives(&vertex.hit))
-                .then(|| Photon::new(vertex, techniques.merging))
-        });
+        let techniques = self.techniques_within(radius);
+        let (found, _) = self
+            .shoot(number, time.unwrap_or(0.0), techniques)
+            .trace(ledger, |vertex| self.photon(vertex, &techniques));
         Iteration {
             time,
             photons: Some(Photons {
@@ -221,7 +249,7 @@ impl<'a> Engine<'a> {
         time: f32,
         sampler: &Sampler,
         ledger: &mut Ledger,
-        kept: &mut Vec<super::light_walk::LightVertex>,
+        kept: &mut Vec<LightVertex>,
     ) {
         let mut rays = std::mem::take(&mut ledger.rays);
         let lens = join::lens_numbers(sampler);

@@ -36,8 +36,8 @@ const LOOKS: u32 = 512;
 /// Radius where the camera sees no size, in diagonals of the scene.
 const SHARE_OF_SCENE: f32 = 0.002;
 
-/// Size of a pixel on the surfaces that the camera sees, in scene units: the median over the picture, of what
-/// receives photons. Where the camera sees none, or has no pixels in space, a share of the scene's size.
+/// Size of a pixel across the line of sight, where surfaces are that the camera sees, in scene units: the median
+/// over the picture, of what receives photons. Where the camera sees none, or has no pixels in space, a share of the scene's size.
 /// Always in the range of [`super::RADII`].
 pub fn footprint(setting: &Setting) -> f32 {
     let bounds = setting.scene.world().bounds();

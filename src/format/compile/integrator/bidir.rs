@@ -13,17 +13,19 @@ const METHODS: [Method; 4] = [Method::Bdpt, Method::Ptracer, Method::Vcm, Method
 pub fn named(name: &str) -> Option<IntegratorSpec> {
     let method = METHODS.into_iter().find(|m| m.name() == name)?;
     let walk = PathSpec::default();
-    Some(settings(method, walk, PhotonSpec::default()))
+    let spec = settings(method, walk, PhotonSpec::default());
+    Some(IntegratorSpec::Bidirectional(spec))
 }
 
-fn settings(method: Method, walk: PathSpec, photons: PhotonSpec) -> IntegratorSpec {
-    IntegratorSpec::Bidirectional(BidirSpec {
+fn settings(method: Method, walk: PathSpec, photons: PhotonSpec) -> BidirSpec {
+    BidirSpec {
         method,
         max_depth: walk.max_depth,
         rr_depth: walk.rr_depth,
         hide_emitters: walk.hide_emitters,
+        light_image: true,
         photons,
-    })
+    }
 }
 
 /// The method that `props` describes, with the settings of the eye's `walk`.
@@ -32,37 +34,29 @@ pub fn spec(props: &Props, walk: PathSpec) -> Result<IntegratorSpec, SceneError>
     let Some(method) = METHODS.into_iter().find(|m| m.name() == name) else {
         return Err(props.error(format!("\"{name}\" has no walk from lights")));
     };
-    match method {
-        Method::Bdpt => {
-            for (name, what) in [
-                ("light_image", "without the light's image"),
-                ("sample_direct", "without samples of emitters"),
-            ] {
-                if !props.bool(name)? {
-                    let what = format!("bidirectional path tracing {what} is not supported");
-                    let help =
-                        format!("leave \"{name}\" out: the weights use each way where it is good");
-                    return Err(props.error_at(name, what).with_help(help));
-                }
-            }
+    if method == Method::Sppm {
+        // How the work is divided changes nothing in the picture.
+        props.ignore(&["granularity"]);
+        if props.int("max_passes")? != -1 {
+            let what = "a number of passes in the integrator is not supported";
+            let help = "set the sampler's sample_count or --spp: a pass is a sample of each pixel";
+            return Err(props.error_at("max_passes", what).with_help(help));
         }
-        Method::Sppm => {
-            // How the work is divided changes nothing in the picture.
-            props.ignore(&["granularity"]);
-            if props.int("max_passes")? != -1 {
-                let what = "a number of passes in the integrator is not supported";
-                let help =
-                    "set the sampler's sample_count or --spp: a pass is a sample of each pixel";
-                return Err(props.error_at("max_passes", what).with_help(help));
-            }
-        }
-        Method::Ptracer | Method::Vcm => {}
+    }
+    let light_image = method != Method::Bdpt || props.bool("light_image")?;
+    if method == Method::Bdpt && !props.bool("sample_direct")? {
+        let what = "bidirectional path tracing without samples of emitters is not supported";
+        let help = "leave \"sample_direct\" out: each technique weighs most where it is good";
+        return Err(props.error_at("sample_direct", what).with_help(help));
     }
     let photons = match method.merges() {
         true => photons::spec(props)?,
         false => PhotonSpec::default(),
     };
-    Ok(settings(method, walk, photons))
+    Ok(IntegratorSpec::Bidirectional(BidirSpec {
+        light_image,
+        ..settings(method, walk, photons)
+    }))
 }
 
 /// That the camera can be reached by an integrator which knows no other way to it.
