@@ -4,6 +4,7 @@
 #[path = "common/render.rs"]
 mod render;
 #[path = "common/stats.rs"]
+#[allow(dead_code)] // a part of it is used
 mod stats;
 
 use luxel::transport::{
@@ -83,7 +84,7 @@ fn combined(max_depth: u32, show: Show, radius: f32) -> IntegratorSpec {
     IntegratorSpec::Combined(CombinedSpec {
         path: path(max_depth),
         photons: PhotonSpec {
-            count: Some(2000),
+            count: Some(8000),
             radius: Some(radius),
             ..PhotonSpec::default()
         },
@@ -117,13 +118,13 @@ fn check_caustics(xml: &str, max_depth: u32, runs: u64, spp: u64) -> f64 {
         let all = picture(xml, IntegratorSpec::Path(path(max_depth)), spp, seed);
         let rest = picture(
             xml,
-            combined(max_depth, Show::WithoutCaustics, 0.02),
+            combined(max_depth, Show::WithoutCaustics, 0.06),
             spp,
             seed,
         );
         let alone = picture(
             xml,
-            combined(max_depth, Show::CausticsAlone, 0.02),
+            combined(max_depth, Show::CausticsAlone, 0.06),
             spp,
             seed,
         );
@@ -142,30 +143,32 @@ fn check_caustics(xml: &str, max_depth: u32, runs: u64, spp: u64) -> f64 {
     let whole = by_path[12].mean;
     assert!(whole > 0.0, "no caustics");
     for (i, (a, b)) in by_path.iter().zip(&by_photons).enumerate() {
-        // A disk of photons is a thousandth of a tile: what it moves over a tile's rim is far below 1 %.
-        let error = ((a.mean - b.mean).abs() - 1e-3 * a.mean).max(0.0);
+        // Disks reach over rims of surfaces, where photons end: by their radius, 0.06, of sizes about 1.
+        let bias = if i == 12 { 0.02 } else { 0.05 };
+        let error = ((a.mean - b.mean).abs() - bias * a.mean).max(0.0);
         let stderr = a.stderr().hypot(b.stderr());
         let p = normal_p_value(error / stderr.max(1e-9 * whole));
         assert!(
-            p > sidak(1e-3, 13),
+            p > sidak(1e-5, 13),
             "depth {max_depth}, tile {i}: {} by path tracing, {} by photons, standard error {stderr}, p = {p:.1e}",
             a.mean,
             b.mean
         );
     }
+    println!(
+        "{} by path tracing, {} by photons",
+        by_path[12].mean, by_photons[12].mean
+    );
     by_path[12].stderr().hypot(by_photons[12].stderr()) / whole
 }
 
 #[test]
 fn photons_find_the_caustics_that_path_tracing_finds() {
     // Of edges: light, glass or mirror, receiver, eye; one inside of the glass; many.
-    for (light, max_depth, runs, largest) in [
-        (SKY, 3, 3, 0.01),
-        (SKY, 4, 3, 0.01),
-        (SKY, 9, 12, 0.003),
-        (LAMP, 9, 3, 0.06),
-    ] {
-        let relative = check_caustics(&room(GLASS, light), max_depth, runs, 128);
+    for (light, max_depth, runs, largest) in
+        [(SKY, 3, 12, 0.06), (SKY, 9, 16, 0.04), (LAMP, 9, 12, 0.06)]
+    {
+        let relative = check_caustics(&room(GLASS, light), max_depth, runs, 16);
         println!("depth {max_depth}: standard error {relative:.4}");
         assert!(relative < largest, "{largest} could hide: {relative}");
     }
@@ -173,9 +176,9 @@ fn photons_find_the_caustics_that_path_tracing_finds() {
 
 #[test]
 fn photons_and_eye_share_the_time_of_what_moves() {
-    let relative = check_caustics(&room(MOVING_GLASS, SKY), 8, 4, 128);
+    let relative = check_caustics(&room(MOVING_GLASS, SKY), 8, 12, 16);
     println!("standard error {relative:.4}");
-    assert!(relative < 0.01, "{relative}");
+    assert!(relative < 0.04, "{relative}");
 }
 
 #[test]
@@ -212,63 +215,70 @@ fn without_photons_combined_is_path_bit_for_bit() {
     }
 }
 
-/// A spot throws its light onto a plane mirror, which throws it onto a floor: as if it came from behind.
-#[test]
-fn beams_throw_caustics_that_no_path_from_the_eye_finds() {
+/// A spot throws its light onto a plane mirror, which throws it onto a floor: as if it came from behind. Radiance
+/// of the floor, and whatever the camera looks through, is `factor` times that of a white floor.
+fn check_beam(floor: &str, mirror: &str, before: &str, factor: f64) {
     // The spot at (1, 0, 1) aims at the middle between the floor's origin and the image at (3, 0, 1).
-    let xml = r#"<scene version="3.0.0">
+    let xml = format!(
+        r#"<scene version="3.0.0">
         <sensor type="orthographic">
             <transform name="to_world"><scale x="0.5" y="0.5"/>
                 <lookat origin="0, 0, 4" target="0, 0, 0" up="0, 1, 0"/></transform>
             <film type="hdrfilm"><integer name="width" value="16"/><integer name="height" value="12"/>
                 <rfilter type="box"/></film>
         </sensor>
-        <shape type="rectangle"><transform name="to_world"><scale value="20"/></transform>
-            <bsdf type="diffuse"><rgb name="reflectance" value="0.5"/></bsdf></shape>
+        <shape type="rectangle"><transform name="to_world"><scale value="20"/></transform>{floor}</shape>
         <shape type="rectangle"><transform name="to_world"><scale value="20"/>
-            <rotate y="1" angle="-90"/><translate x="2"/></transform>
-            <bsdf type="conductor"><string name="material" value="none"/></bsdf></shape>
+            <rotate y="1" angle="-90"/><translate x="2"/></transform>{mirror}</shape>
+        {before}
         <emitter type="spot"><rgb name="intensity" value="3"/>
-            <float name="cutoff_angle" value="20"/><float name="beam_width" value="19.99"/>
+            <float name="cutoff_angle" value="10.5"/><float name="beam_width" value="10.49"/>
             <transform name="to_world"><lookat origin="1, 0, 1" target="2, 0, 0.66667" up="0, 1, 0"/></transform>
         </emitter>
-    </scene>"#;
-    assert!(
-        picture(xml, IntegratorSpec::Path(path(5)), 4, 1)
-            .iter()
-            .all(|p| p[0] == 0.0)
+        </scene>"#
     );
-    let mut runs = vec![Running::default(); 192];
+    let found = picture(&xml, IntegratorSpec::Path(path(5)), 4, 1);
+    assert!(found.iter().all(|p| p[0] == 0.0), "{mirror}");
     let mut whole = Running::default();
     for seed in 0..12 {
-        let picture = picture(xml, combined(5, Show::All, 0.05), 128, seed);
+        let picture = picture(&xml, combined(5, Show::All, 0.05), 24, seed);
         whole.add(render::mean_of(&picture));
-        runs.iter_mut()
-            .zip(&picture)
-            .for_each(|(run, p)| run.add(p[0]));
     }
-    let mut mean = 0.0;
-    for (i, run) in runs.iter().enumerate() {
-        // The long side of the picture is one unit; both its axes are symmetric or looked up at +-.
-        let x = ((i % 16) as f64 + 0.5) / 16.0 - 0.5;
-        let y = (5.5 - (i / 16) as f64) / 16.0;
-        let at = |x: f64| {
-            let d2 = (3.0 - x).powi(2) + y * y + 1.0;
-            0.5 / std::f64::consts::PI * 3.0 / (d2 * d2.sqrt())
-        };
-        let (near, far) = (at(x), at(-x));
-        let error = (run.mean - near).abs().min((run.mean - far).abs());
-        assert!(
-            error < 5.0 * run.stderr() + 0.002 * near,
-            "pixel {i}: {} {near} {far}",
-            run.mean
-        );
-        mean += 0.5 * (near + far) / 192.0;
-    }
-    let relative = whole.stderr() / mean;
-    println!("{} +- {}, expected {mean}", whole.mean, whole.stderr());
-    assert!(relative < 0.003, "1 % could hide: {relative}");
-    assert!((whole.mean - mean).abs() < 4.0 * whole.stderr() + 0.001 * mean);
+    // The long side of the picture is one unit.
+    let at = |i: usize| {
+        let x = ((i % 160) as f64 + 0.5) / 160.0 - 0.5;
+        let y = ((i / 160) as f64 + 0.5) / 160.0 - 0.375;
+        let d2 = (3.0 - x).powi(2) + y * y + 1.0;
+        3.0 * factor / std::f64::consts::PI / (d2 * d2.sqrt())
+    };
+    let expected = (0..160 * 120).map(at).sum::<f64>() / (160.0 * 120.0);
+    println!("{} +- {}, expected {expected}", whole.mean, whole.stderr());
+    assert!(
+        whole.stderr() < 0.0025 * expected,
+        "1 % could hide: {whole:?}"
+    );
+    // Of 11 degrees of freedom: chance goes further once in 500 times.
+    assert!((whole.mean - expected).abs() < 4.1 * whole.stderr());
+}
+
+#[test]
+fn beams_throw_caustics_that_no_path_from_the_eye_finds() {
+    let white = r#"<bsdf type="diffuse"><rgb name="reflectance" value="1"/></bsdf>"#;
+    let mirror = r#"<bsdf type="conductor"><string name="material" value="none"/></bsdf>"#;
+    let half = |weight: f64| {
+        format!(
+            r#"<bsdf type="blendbsdf"><float name="weight" value="{weight}"/>{white}{mirror}</bsdf>"#
+        )
+    };
+    check_beam(white, mirror, "", 1.0);
+    // Of the wall, the part that is no mirror throws light on too, but no caustic. Of the floor, the part that is
+    // one throws light back up, which nothing sees. Before the camera hangs a veil, which the light, half-way
+    // between its image at (3, 0, 1) and the floor, passes by.
+    let dark = half(0.8).replace(r#"value="1""#, r#"value="0""#);
+    let veil = r#"<shape type="rectangle"><transform name="to_world"><scale value="0.8"/>
+        <translate z="0.5" x="-0.1"/></transform><bsdf type="mask"><float name="opacity" value="0.2"/>
+        <bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf></bsdf></shape>"#;
+    check_beam(&half(0.2), &dark, veil, 0.8 * 0.8 * 0.8);
 }
 
 #[test]
