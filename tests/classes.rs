@@ -366,3 +366,29 @@ fn threads_change_nothing() {
         assert!(with(1) == with(4), "{}", integrator.name());
     }
 }
+
+#[test]
+fn photons_that_would_not_fit_are_refused_before_rendering() {
+    let message = |integrator: &str| {
+        let scene = r#"<scene version="3.0.0">"#;
+        let xml = room(GLASS, LAMP).replace(scene, &format!("{scene}{integrator}"));
+        let folder = std::path::Path::new(".");
+        let desc = luxel::format::load_str("test.xml", &xml, folder, &[]).unwrap();
+        let overrides = luxel::format::Overrides::default();
+        let error = luxel::format::compile(&desc, &overrides).expect_err(integrator);
+        error.to_string()
+    };
+    let combined = message(
+        r#"<integrator type="combined"><integer name="photon_count" value="1000000000"/>
+        <integer name="memory" value="64"/></integrator>"#,
+    );
+    assert!(
+        combined.contains("photon_count 1000000000 makes about"),
+        "{combined}"
+    );
+    let maps = message(
+        r#"<integrator type="photonmapper"><integer name="global_photons" value="1000000"/>
+        <integer name="memory" value="64"/></integrator>"#,
+    );
+    assert!(maps.contains("maps of 1250000 photons may take"), "{maps}");
+}
