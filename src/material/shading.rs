@@ -3,7 +3,7 @@
 use super::relief;
 use crate::bsdf::{Bsdf, BsdfSample, Mode};
 use crate::geom::Hit;
-use crate::math::{Frame, Rgb, Vec2, Vec3};
+use crate::math::{Frame, PI, Rgb, Vec2, Vec3};
 
 /// How the surface scatters light at one hit. All directions are unit vectors in world space.
 #[derive(Clone, Copy, Debug)]
@@ -66,6 +66,20 @@ impl Shading {
         Shading {
             wo: self.frame.to_local(wo),
             ..*self
+        }
+    }
+
+    /// If all that the surface does is to scatter diffusely: f in 1/sr, the unit normal that `wi` must be on
+    /// the side of, and the density per steradian with which a walk that comes from there goes on to
+    /// `hit.wo`.
+    #[inline]
+    pub fn lambert(&self) -> Option<(Rgb, Vec3, f32)> {
+        match self.bsdf {
+            Bsdf::Diffuse(diffuse) if self.bend.is_none() && self.wo.z > 0.0 => {
+                let f = diffuse.albedo * (1.0 / PI);
+                Some((f, self.frame.n, self.wo.z * (1.0 / PI)))
+            }
+            _ => None,
         }
     }
 

@@ -137,10 +137,10 @@ enum Choice {
 impl Aim {
     /// The share within its range, 0 where there is no target.
     pub(super) fn share(&self) -> f64 {
-        match self.targets.is_empty() {
-            true => 0.0,
-            // In this form a NaN is 0.
-            false => f64::from(self.share.max(0.0).min(1.0)),
+        // In this form a NaN is no share.
+        match self.share > 0.0 && !self.targets.is_empty() {
+            true => f64::from(self.share.min(1.0)),
+            false => 0.0,
         }
     }
 

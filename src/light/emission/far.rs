@@ -192,7 +192,7 @@ impl Lights {
 
     /// Densities of light from the direction `wi` at infinity that arrives at `at`.
     pub(super) fn pdf_sky_emission(&self, aim: &Aim, at: &Hit, wi: Vec3) -> Option<EmissionPdf> {
-        self.from_infinity(aim, at, wi, self.pdf_sky(wi), true)
+        self.pdf_entering(aim, at, wi, self.pdf_sky(wi), true)
     }
 
     /// The same for directional light of the emitter of this number.
@@ -204,10 +204,11 @@ impl Lights {
         emitter: u32,
     ) -> Option<EmissionPdf> {
         let index = self.far.emitters.iter().position(|&e| e == emitter)?;
-        self.from_infinity(aim, at, wi, self.sources.prob_of_far(index), false)
+        self.pdf_entering(aim, at, wi, self.sources.prob_of_far(index), false)
     }
 
-    fn from_infinity(
+    /// Densities of light from the direction `wi` with this density or probability of its start.
+    fn pdf_entering(
         &self,
         aim: &Aim,
         at: &Hit,

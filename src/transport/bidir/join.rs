@@ -6,7 +6,7 @@ use crate::bsdf::{Density, Mode};
 use crate::film::Splat;
 use crate::geom::{Endpoint, Hit};
 use crate::material::Shading;
-use crate::math::{Rgb, Vec2, Vec3};
+use crate::math::{PI, Rgb, Vec2, Vec3};
 use crate::sampler::{Sampler, dim};
 use crate::scene::Scene;
 use crate::transport::light_walk::LightVertex;
@@ -44,6 +44,21 @@ impl Photon {
             cut: ratio(vertex.state.cut, here),
             reverse: ratio(vertex.state.reverse, here),
         }
+    }
+}
+
+impl Photon {
+    /// Whether it can be merged with a vertex of the eye's walk at `hit`, `offset` away, where paths may have
+    /// at most `most` edges more.
+    #[inline]
+    fn counts(&self, photons: &Photons, hit: &Hit, offset: Vec3, most: u32) -> bool {
+        self.edges <= most && photons.kernel.accepts(hit, self.ng, offset) && self.cos(hit) > 0.0
+    }
+
+    /// Cosine under which it would have arrived at `hit`.
+    #[inline]
+    fn cos(&self, hit: &Hit) -> f32 {
+        hit.ng.dot(self.wi).abs()
     }
 }
 
@@ -244,38 +259,68 @@ impl EyeWalk<'_> {
 
     /// Light of the photons around `vertex`.
     fn merge(&self, vertex: &EyeVertex, photons: &Photons) -> Rgb {
-        let scene = self.engine.setting.scene;
-        let hit = &vertex.hit;
-        let here = |caustic| {
-            let merging = self.techniques.merging(caustic, vertex.later);
-            mis::power(vertex.state.pdf * merging)
-        };
-        let here = [here(false), here(true)];
-        let of_caustic =
-            mis::power(self.techniques.merging / self.techniques.merging(true, vertex.later))
-                as f32;
+        let (scene, hit) = (self.engine.setting.scene, &vertex.hit);
+        let gather = Gather::new(&self.techniques, vertex);
+        let most = self.engine.max_depth - vertex.edges;
         let mut sum = Rgb::BLACK;
+        // The most common surface by a short way of its own: what depends on the eye's walk is the same for
+        // all photons.
+        if let Some((f, normal, back)) = vertex.shading.lambert() {
+            let ahead = gather.ahead(vertex, back);
+            photons.map.around(hit.p, |photon, offset, _| {
+                let cos = normal.dot(photon.wi);
+                if cos > 0.0 && photon.counts(photons, hit, offset, most) {
+                    let weight = gather.weight(photon, cos * (1.0 / PI), ahead);
+                    sum += photon.power * (cos * weight / photon.cos(hit));
+                }
+            });
+            return sum * f * photons.density;
+        }
         photons.map.around(hit.p, |photon, offset, _| {
-            if photon.edges + vertex.edges > self.engine.max_depth
-                || !photons.kernel.accepts(hit, photon.ng, offset)
-            {
-                return;
+            if photon.counts(photons, hit, offset, most) {
+                let (f_cos, pdf, back) = vertex.eval(scene, photon.wi);
+                if !f_cos.is_black() {
+                    let weight = gather.weight(photon, pdf, gather.ahead(vertex, back));
+                    sum += photon.power * f_cos * (weight / photon.cos(hit));
+                }
             }
-            let (f_cos, pdf, back) = vertex.eval(scene, photon.wi);
-            if f_cos.is_black() {
-                return;
-            }
-            let mut behind = photon.cut + pdf * pdf * photon.reverse;
-            if photon.caustic {
-                behind *= of_caustic;
-            }
-            let ahead = ratio(
-                vertex.state.sum(f64::from(back)),
-                here[usize::from(photon.caustic)],
-            );
-            let cos = hit.ng.dot(photon.wi).abs();
-            sum += photon.power * f_cos * (1.0 / (cos * (1.0 + behind + ahead)));
         });
         sum * photons.density
+    }
+}
+
+/// What the weights of all photons at one vertex of the eye's walk share.
+struct Gather {
+    /// Power of the density of merging there over that of the walk behind it: for light that came by other
+    /// lobes than delta ones, and for caustics.
+    here: [f64; 2],
+    /// What turns a photon's weights, for an eye's walk that was not scattered before, into those of this.
+    scale: [f32; 2],
+}
+
+impl Gather {
+    fn new(techniques: &Techniques, vertex: &EyeVertex) -> Gather {
+        let merging = [false, true].map(|caustic| techniques.merging(caustic, vertex.later));
+        Gather {
+            here: merging.map(|merging| mis::power(vertex.state.pdf * merging)),
+            scale: merging.map(|merging| mis::power(techniques.merging / merging) as f32),
+        }
+    }
+
+    /// Sum of the techniques that cut the path on the eye's side, relative to merging here; `back` is the
+    /// density with which light goes on to the eye.
+    #[inline]
+    fn ahead(&self, vertex: &EyeVertex, back: f32) -> [f32; 2] {
+        let sum = vertex.state.sum(f64::from(back));
+        self.here.map(|here| ratio(sum, here))
+    }
+
+    /// Weight of merging with `photon`; `pdf` is the density with which the eye's walk goes on to where it
+    /// came from.
+    #[inline]
+    fn weight(&self, photon: &Photon, pdf: f32, ahead: [f32; 2]) -> f32 {
+        let class = usize::from(photon.caustic);
+        let behind = (photon.cut + pdf * pdf * photon.reverse) * self.scale[class];
+        1.0 / (1.0 + behind + ahead[class])
     }
 }

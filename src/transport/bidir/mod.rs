@@ -271,4 +271,4 @@ impl<'a> Engine<'a> {
 }
 
 /// Radius of the first iteration's disk in pixels.
-const RADIUS_IN_PIXELS: f32 = 2.0;
+const RADIUS_IN_PIXELS: f32 = 3.0;
