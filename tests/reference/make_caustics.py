@@ -17,7 +17,7 @@ import OpenEXR
 
 # With the radius of the first iteration, an eighth of a pixel and less.
 SCENES = {"bulb": 0.02, "marbles": 0.015, "ring": 0.015}
-SPP, SIZE = 2048, "48x36"
+SPP, SIZE = 1024, "48x36"
 here = Path(__file__).parent
 
 
@@ -33,13 +33,13 @@ def half(luxel, scene, radius, seed, folder):
     copy.write_text(xml.replace('<integrator type="$integrator">', radius))
     out = Path(folder) / f"{scene}-{seed}.exr"
     try:
-        options = ["--spp", str(SPP), "--seed", str(seed), "--resolution", SIZE, "-o", str(out)]
+        options = ["--spp", str(SPP), "--seed", str(seed), "--resolution", SIZE, "--progress", "never", "-o", str(out)]
         subprocess.run([luxel, "render", str(copy), *options], check=True)
     finally:
         copy.unlink()
-    channels = OpenEXR.File(str(out), separate_channels=True).channels()
-    layer = lambda prefix: np.stack([channels[prefix + c].pixels for c in "RGB"], 2).astype(np.float64)
-    return layer(""), layer("stderr.") ** 2
+    parts = {part.name(): part for part in OpenEXR.File(str(out), separate_channels=True).parts}
+    layer = lambda name: np.stack([parts[name].channels[c].pixels for c in "RGB"], 2).astype(np.float64)
+    return layer("main"), layer("stderr") ** 2
 
 
 for name in sys.argv[2:] or SCENES:
