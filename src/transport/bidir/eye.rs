@@ -129,7 +129,7 @@ impl EyeWalk<'_> {
                 || vertex.pdf_back(scene, sample.wi),
                 f64::from(hit.ng.dot(sample.wi).abs()),
                 self.techniques.connection,
-                [false, true].map(|caustic| self.techniques.merging(caustic, later)),
+                self.techniques.merging(later),
             );
             later |= sample.density != Density::Delta;
             ray = hit.spawn(sample.wi);

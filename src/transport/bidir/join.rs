@@ -23,8 +23,7 @@ pub struct Photon {
     power: Rgb,
     /// Edges behind it.
     edges: u32,
-    /// Whether it came by delta lobes alone.
-    caustic: bool,
+
     /// Weight of the techniques that cut the path just before the photon, and of those before that, over the
     /// power of the density of going back; relative to merging here.
     cut: f32,
@@ -40,7 +39,6 @@ impl Photon {
             ng: vertex.hit.ng,
             power: vertex.power,
             edges: vertex.edges,
-            caustic: vertex.specular,
             cut: ratio(vertex.state.cut, here),
             reverse: ratio(vertex.state.reverse, here),
         }
@@ -172,7 +170,8 @@ impl EyeWalk<'_> {
             }
             add(Technique::Connection, lit, ledger);
         }
-        if let Some(photons) = self.photons {
+        let merges = self.techniques.merging(vertex.later) > 0.0;
+        if let Some(photons) = self.photons.filter(|_| merges) {
             add(Technique::Merging, self.merge(vertex, photons), ledger);
         }
         sum
@@ -249,10 +248,9 @@ impl EyeWalk<'_> {
         let merging = light.merging(&self.techniques, true);
         let rivals = mis::power(there) * light.state.bracket(f64::from(light_back), merging)
             + mis::power(here)
-                * vertex.state.bracket(
-                    f64::from(back),
-                    self.techniques.merging(false, vertex.later),
-                );
+                * vertex
+                    .state
+                    .bracket(f64::from(back), self.techniques.merging(vertex.later));
         let weight = f64::from(seen) / (dist2 * (1.0 + rivals));
         f_cos * light.power * scattered * weight as f32
     }
@@ -291,36 +289,33 @@ impl EyeWalk<'_> {
 
 /// What the weights of all photons at one vertex of the eye's walk share.
 struct Gather {
-    /// Power of the density of merging there over that of the walk behind it: for light that came by other
-    /// lobes than delta ones, and for caustics.
-    here: [f64; 2],
+    /// Power of the density of merging there over that of the walk behind it.
+    here: f64,
     /// What turns a photon's weights, for an eye's walk that was not scattered before, into those of this.
-    scale: [f32; 2],
+    scale: f32,
 }
 
 impl Gather {
     fn new(techniques: &Techniques, vertex: &EyeVertex) -> Gather {
-        let merging = [false, true].map(|caustic| techniques.merging(caustic, vertex.later));
+        let merging = techniques.merging(vertex.later);
         Gather {
-            here: merging.map(|merging| mis::power(vertex.state.pdf * merging)),
-            scale: merging.map(|merging| mis::power(techniques.merging / merging) as f32),
+            here: mis::power(vertex.state.pdf * merging),
+            scale: mis::power(techniques.merging / merging) as f32,
         }
     }
 
     /// Sum of the techniques that cut the path on the eye's side, relative to merging here; `back` is the
     /// density with which light goes on to the eye.
     #[inline]
-    fn ahead(&self, vertex: &EyeVertex, back: f32) -> [f32; 2] {
-        let sum = vertex.state.sum(f64::from(back));
-        self.here.map(|here| ratio(sum, here))
+    fn ahead(&self, vertex: &EyeVertex, back: f32) -> f32 {
+        ratio(vertex.state.sum(f64::from(back)), self.here)
     }
 
     /// Weight of merging with `photon`; `pdf` is the density with which the eye's walk goes on to where it
     /// came from.
     #[inline]
-    fn weight(&self, photon: &Photon, pdf: f32, ahead: [f32; 2]) -> f32 {
-        let class = usize::from(photon.caustic);
-        let behind = (photon.cut + pdf * pdf * photon.reverse) * self.scale[class];
-        1.0 / (1.0 + behind + ahead[class])
+    fn weight(&self, photon: &Photon, pdf: f32, ahead: f32) -> f32 {
+        let behind = (photon.cut + pdf * pdf * photon.reverse) * self.scale;
+        1.0 / (1.0 + behind + ahead)
     }
 }
