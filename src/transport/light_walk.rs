@@ -220,6 +220,7 @@ impl LightWalk<'_> {
                         true => mis::power(pdf.start_per_sr(dist2) / start),
                         false => 0.0,
                     },
+                    cut_straight: 0.0,
                     cut: match self.techniques.next_event {
                         true => mis::power(connected() / start),
                         false => 0.0,

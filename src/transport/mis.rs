@@ -74,6 +74,8 @@ pub struct State {
     /// Density, relative to this walk's, of the cut just before this vertex, if it has a lobe that is not a
     /// delta one.
     pub cut: f64,
+    /// The same for light that comes here straight from an emitter.
+    pub cut_straight: f64,
 }
 
 /// What a walk knows on leaving a vertex.
@@ -95,7 +97,13 @@ impl State {
         self.cut + power(back) * self.reverse
     }
 
-    /// That sum, and merging here if `merging` is its eta, over the density of this vertex: what the density
+    /// The same for light that comes here straight from an emitter.
+    #[inline]
+    pub fn sum_straight(&self, back: f64) -> f64 {
+        self.cut_straight + power(back) * self.reverse
+    }
+
+    /// [`State::sum`], and merging here if `merging` is its eta, over the density of this vertex: what the density
     /// with which the other walk makes this vertex is multiplied with.
     #[inline]
     pub fn bracket(&self, back: f64, merging: f64) -> f64 {
@@ -122,12 +130,12 @@ impl State {
                 cut: 0.0,
             },
             Density::PerSr(pdf) => {
-                let unmerged = self.sum(f64::from(back())) / power(self.pdf);
+                let back = f64::from(back());
                 Leg {
                     onward: f64::from(pdf),
-                    bracket: unmerged + power(merging),
+                    bracket: self.bracket(back, merging),
                     // Straight from an emitter, light is not merged.
-                    bracket_met: unmerged,
+                    bracket_met: self.sum_straight(back) / power(self.pdf),
                     cos,
                     cut: if cut { 1.0 } else { 0.0 },
                 }
@@ -153,6 +161,7 @@ impl Leg {
             pdf: self.onward * cos / dist2,
             reverse: back * self.bracket,
             cut: self.cut,
+            cut_straight: self.cut,
         }
     }
 }

@@ -157,6 +157,8 @@ impl EyeWalk<'_> {
                 State {
                     pdf: f64::from(importance) * cos,
                     cut: mis::power(self.techniques.splats),
+                    // Connecting to the emitter does better.
+                    cut_straight: 0.0,
                     ..State::default()
                 }
             }

@@ -102,6 +102,12 @@ impl EyeVertex {
     }
 }
 
+/// Weight of a connection that is always looked along; of those that weigh less, Russian roulette leaves a part.
+const WORTH_A_RAY: f64 = 0.2;
+
+/// Its multiples are spread evenly over the unit interval, whole numbers left out.
+const GOLDEN_RATIO: f32 = 0.618_034;
+
 /// The numbers that choose the point of the lens that a walk of light is connected to.
 pub fn lens_numbers(sampler: &Sampler) -> Vec2 {
     let [.., x, y] = sampler.get4(dim::EMISSION);
@@ -165,8 +171,10 @@ impl EyeWalk<'_> {
         add(Technique::NextEvent, lit, ledger);
         if self.techniques.connection {
             let mut lit = Rgb::BLACK;
-            for light in self.light {
-                lit += self.connect(vertex, light, ledger);
+            for (i, light) in self.light.iter().enumerate() {
+                // A number of its own for each, as well spread as one number allows.
+                let u = (u.roulette + i as f32 * GOLDEN_RATIO).fract();
+                lit += self.connect(vertex, light, u, ledger);
             }
             add(Technique::Connection, lit, ledger);
         }
@@ -207,12 +215,13 @@ impl EyeWalk<'_> {
         let cos = f64::from(hit.ng.dot(light.wi).abs());
         let walked = f64::from(emitted.start) * emitted.arrival(dist2, cos) / connected;
         // Light straight from an emitter is not merged.
-        let rivals = met + mis::power(walked) * vertex.state.bracket(f64::from(back), 0.0);
+        let ahead = vertex.state.sum_straight(f64::from(back)) / mis::power(vertex.state.pdf);
+        let rivals = met + mis::power(walked) * ahead;
         f_cos * light.weight() * (seen / (1.0 + rivals) as f32)
     }
 
     /// Light that arrives from a vertex of light.
-    fn connect(&self, vertex: &EyeVertex, light: &LightVertex, ledger: &mut Ledger) -> Rgb {
+    fn connect(&self, vertex: &EyeVertex, light: &LightVertex, u: f32, ledger: &mut Ledger) -> Rgb {
         let scene = self.engine.setting.scene;
         let edges = vertex.edges + light.edges + 1;
         let Some(passes) = self.engine.max_depth.checked_sub(edges) else {
@@ -230,16 +239,6 @@ impl EyeWalk<'_> {
         if scattered.is_black() {
             return Rgb::BLACK;
         }
-        let end = Endpoint {
-            p: from.p,
-            p_err: from.p_err,
-            ng: from.ng,
-        };
-        ledger.connect(Technique::Connection);
-        let seen = scene.transmittance(&hit.spawn_to(&end), passes);
-        if seen == 0.0 {
-            return Rgb::BLACK;
-        }
         let cos_here = f64::from(hit.ng.dot(wi).abs());
         let cos_there = f64::from(from.ng.dot(wi).abs());
         let (_, light_pdf) = light.shading.eval_pdf(-wi, Mode::Importance);
@@ -251,7 +250,23 @@ impl EyeWalk<'_> {
                 * vertex
                     .state
                     .bracket(f64::from(back), self.techniques.merging(vertex.later));
-        let weight = f64::from(seen) / (dist2 * (1.0 + rivals));
+        // What other techniques find better is not worth a ray each time.
+        let weight = 1.0 / (1.0 + rivals);
+        let survival = (weight / WORTH_A_RAY).min(1.0);
+        if f64::from(u) >= survival {
+            return Rgb::BLACK;
+        }
+        let end = Endpoint {
+            p: from.p,
+            p_err: from.p_err,
+            ng: from.ng,
+        };
+        ledger.connect(Technique::Connection);
+        let seen = scene.transmittance(&hit.spawn_to(&end), passes);
+        if seen == 0.0 {
+            return Rgb::BLACK;
+        }
+        let weight = f64::from(seen) * weight / (survival * dist2);
         f_cos * light.power * scattered * weight as f32
     }
 

@@ -265,7 +265,9 @@ impl<'a> Engine<'a> {
                 if vertex.shading.bsdf.is_delta() {
                     return true;
                 }
-                if techniques.splats > 0.0 {
+                // Light straight from an emitter, next-event estimation finds with less noise.
+                let straight = techniques.next_event && vertex.scattered == 0;
+                if techniques.splats > 0.0 && !straight {
                     self.splat(&techniques, vertex, lens, ledger);
                 }
                 if techniques.connection {
