@@ -1,5 +1,6 @@
 //! `luxel info`.
 
+use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -27,7 +28,7 @@ pub struct InfoArgs {
 
 pub fn run(args: &InfoArgs) -> Result<Outcome, Failure> {
     if args.plugins {
-        print!("{}", plugins::reference());
+        show(&plugins::reference());
         return Ok(Outcome::Done);
     }
     let desc = match &args.scene {
@@ -53,24 +54,30 @@ pub fn run(args: &InfoArgs) -> Result<Outcome, Failure> {
             "plan": plan,
             "warnings": compiled.warnings,
         });
-        println!("{info:#}");
+        show(&format!("{info:#}\n"));
         return Ok(Outcome::Done);
     }
-    println!("Contains");
+    let mut text = "Contains\n".to_string();
     for (name, value) in facts(job, compiled.spp) {
-        println!("  {name:<12} {value}");
+        text += &format!("  {name:<12} {value}\n");
     }
-    println!("\nModelled");
+    text += "\nModelled\n";
     for e in plan {
-        println!(
-            "  {:<15} {}\n                  because {}",
+        text += &format!(
+            "  {:<15} {}\n                  because {}\n",
             e.subject, e.decision, e.reason
         );
     }
     for warning in &compiled.warnings {
-        println!("\nwarning: {warning}");
+        text += &format!("\nwarning: {warning}\n");
     }
+    show(&text);
     Ok(Outcome::Done)
+}
+
+/// Prints as much as the reader takes: a pipe that closes early is no fault.
+fn show(text: &str) {
+    let _ = std::io::stdout().write_all(text.as_bytes());
 }
 
 fn facts(job: &Job, spp: u64) -> Vec<(&'static str, String)> {

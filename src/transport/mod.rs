@@ -100,6 +100,7 @@ impl IntegratorSpec {
     /// What the estimator decides on in `scene`, for the plan.
     pub fn plan(&self, scene: &Scene) -> Option<PlanEntry> {
         match self {
+            IntegratorSpec::Bidirectional(spec) => Some(spec.plan(scene)),
             IntegratorSpec::Combined(spec) => Some(spec.plan(scene)),
             IntegratorSpec::PhotonMapper(spec) => Some(spec.plan(scene)),
             _ => None,

@@ -17,7 +17,7 @@ use crate::geom::Ray;
 use crate::light::Aim;
 use crate::math::PI;
 use crate::sampler::Sampler;
-use crate::scene::CameraSample;
+use crate::scene::{CameraSample, PlanEntry, Scene};
 use join::Photon;
 
 /// Which techniques are joined.
@@ -74,6 +74,32 @@ pub struct BidirSpec {
     /// only they find is lost: the caustics of point lights.
     pub light_image: bool,
     pub photons: PhotonSpec,
+}
+
+impl BidirSpec {
+    /// What of `scene` is never found, and why.
+    pub fn plan(&self, scene: &Scene) -> PlanEntry {
+        let specular = scene.throws_caustics().is_ok();
+        let (decision, reason) = match self.method {
+            Method::Ptracer if specular => (
+                "what is seen in mirrors and through glass stays dark",
+                "light alone walks, and no light walk ends in a camera by chance",
+            ),
+            Method::Bdpt if specular => (
+                "caustics of points and beams stay dark where they are seen in mirrors or through glass",
+                "no vertex is left to connect walks from both ends at",
+            ),
+            _ => (
+                "all are found",
+                "walks from both ends meet wherever light is scattered",
+            ),
+        };
+        PlanEntry {
+            subject: "light paths",
+            decision: decision.to_string(),
+            reason: reason.to_string(),
+        }
+    }
 }
 
 /// The photons of one iteration.

@@ -142,8 +142,12 @@ impl Wanted {
         };
         let (_, tally) = pilot.trace(ledger, &store);
         let per_walk = tally.stored as f64 / pilot.count.max(1) as f64;
-        // Where hardly any walk leaves a photon, more walks are not worth their time.
-        let count = (self.photons as f64 / per_walk.max(WORTH)).ceil() as u64;
+        // Where hardly any walk leaves a photon, more walks are not worth their time; where none does, there is
+        // no light to wait for.
+        let count = match tally.stored {
+            0 => 0,
+            _ => (self.photons as f64 / per_walk.max(WORTH)).ceil() as u64,
+        };
         let (photons, _) = Shoot { count, ..shoot }.trace(ledger, store);
         let placed = photons.into_iter().map(|(p, photon)| (p, (p, photon)));
         Map {
@@ -163,4 +167,4 @@ pub fn bytes(photons: u64) -> u64 {
 /// Walks that tell how many photons a walk leaves.
 const PILOT: u64 = 1 << 14;
 /// Least photons of a walk that count on.
-const WORTH: f64 = 0.01;
+const WORTH: f64 = 0.05;
