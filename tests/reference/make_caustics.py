@@ -4,8 +4,8 @@
     python tests/reference/make_caustics.py LUXEL [SCENE...]
 
 For each scene of scenes/caustics it renders two independent halves with the integrator vcm, writes their mean and
-the variance of that mean, and says how far they agree; the median of the squared deviations over that of noise, 1 if they differ
-by their noise alone.
+the variance of that mean, and says how far they agree. The median of the squared deviations,
+over that of a normal distribution, is 1 if they differ by their noise alone.
 """
 import subprocess
 import sys
