@@ -16,7 +16,7 @@ import numpy as np
 import OpenEXR
 
 # With the radius of the first iteration, an eighth of a pixel and less.
-SCENES = {"bulb": 0.02, "marbles": 0.015, "ring": 0.015}
+SCENES = {"bulb": 0.02, "marbles": 0.015}
 SPP, SIZE = 1024, "48x36"
 here = Path(__file__).parent
 
