@@ -217,7 +217,7 @@ fn without_photons_combined_is_path_bit_for_bit() {
 
 /// A spot throws its light onto a plane mirror, which throws it onto a floor: as if it came from behind. Radiance
 /// of the floor, and whatever the camera looks through, is `factor` times that of a white floor.
-fn check_beam(floor: &str, mirror: &str, before: &str, factor: f64) {
+fn check_beam(floor: &str, mirror: &str, before: &str, factor: f64, spp: u64) {
     // The spot at (1, 0, 1) aims at the middle between the floor's origin and the image at (3, 0, 1).
     let xml = format!(
         r#"<scene version="3.0.0">
@@ -241,7 +241,7 @@ fn check_beam(floor: &str, mirror: &str, before: &str, factor: f64) {
     assert!(found.iter().all(|p| p[0] == 0.0), "{mirror}");
     let mut whole = Running::default();
     for seed in 0..12 {
-        let picture = picture(&xml, combined(5, Show::All, 0.05), 24, seed);
+        let picture = picture(&xml, combined(5, Show::All, 0.05), spp, seed);
         whole.add(render::mean_of(&picture));
     }
     // The long side of the picture is one unit.
@@ -270,7 +270,7 @@ fn beams_throw_caustics_that_no_path_from_the_eye_finds() {
             r#"<bsdf type="blendbsdf"><float name="weight" value="{weight}"/>{white}{mirror}</bsdf>"#
         )
     };
-    check_beam(white, mirror, "", 1.0);
+    check_beam(white, mirror, "", 1.0, 24);
     // Of the wall, the part that is no mirror throws light on too, but no caustic. Of the floor, the part that is
     // one throws light back up, which nothing sees. Before the camera hangs a veil, which the light, half-way
     // between its image at (3, 0, 1) and the floor, passes by.
@@ -278,7 +278,7 @@ fn beams_throw_caustics_that_no_path_from_the_eye_finds() {
     let veil = r#"<shape type="rectangle"><transform name="to_world"><scale value="0.8"/>
         <translate z="0.5" x="-0.1"/></transform><bsdf type="mask"><float name="opacity" value="0.2"/>
         <bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf></bsdf></shape>"#;
-    check_beam(&half(0.2), &dark, veil, 0.8 * 0.8 * 0.8);
+    check_beam(&half(0.2), &dark, veil, 0.8 * 0.8 * 0.8, 64);
 }
 
 #[test]
@@ -365,4 +365,30 @@ fn threads_change_nothing() {
         };
         assert!(with(1) == with(4), "{}", integrator.name());
     }
+}
+
+#[test]
+fn photons_that_would_not_fit_are_refused_before_rendering() {
+    let message = |integrator: &str| {
+        let scene = r#"<scene version="3.0.0">"#;
+        let xml = room(GLASS, LAMP).replace(scene, &format!("{scene}{integrator}"));
+        let folder = std::path::Path::new(".");
+        let desc = luxel::format::load_str("test.xml", &xml, folder, &[]).unwrap();
+        let overrides = luxel::format::Overrides::default();
+        let error = luxel::format::compile(&desc, &overrides).expect_err(integrator);
+        error.to_string()
+    };
+    let combined = message(
+        r#"<integrator type="combined"><integer name="photon_count" value="1000000000"/>
+        <integer name="memory" value="64"/></integrator>"#,
+    );
+    assert!(
+        combined.contains("photon_count 1000000000 makes about"),
+        "{combined}"
+    );
+    let maps = message(
+        r#"<integrator type="photonmapper"><integer name="global_photons" value="1000000"/>
+        <integer name="memory" value="64"/></integrator>"#,
+    );
+    assert!(maps.contains("maps of 1250000 photons may take"), "{maps}");
 }

@@ -159,6 +159,19 @@ impl Bsdf {
         )
     }
 
+    /// Whether some lobe is neither a delta nor a diffuse one.
+    #[inline]
+    pub fn is_glossy(&self) -> bool {
+        matches!(
+            self,
+            Bsdf::RoughConductor(_)
+                | Bsdf::RoughDielectric(_)
+                | Bsdf::RoughPlastic(_)
+                | Bsdf::Principled(_)
+                | Bsdf::PrincipledThin(_)
+        )
+    }
+
     /// Whether some lobe is a delta one that reflects or refracts. What lets light pass straight on as if it
     /// were not there has none.
     #[inline]

@@ -187,6 +187,17 @@ impl Material {
         }
     }
 
+    /// Whether some part of the material has a lobe that is neither a delta nor a diffuse one.
+    pub fn is_glossy(&self) -> bool {
+        match self {
+            Material::TwoSided { front, back } => front.is_glossy() || back.is_glossy(),
+            Material::Mask { inside, .. } | Material::Relief { inside, .. } => inside.is_glossy(),
+            Material::Blend { parts, .. } => parts.iter().any(Material::is_glossy),
+            Material::Uniform(bsdf) | Material::UniformBothSides(bsdf) => bsdf.is_glossy(),
+            plain => plain.bsdf(&At::default()).is_glossy(),
+        }
+    }
+
     /// Whether some part of the material has a delta lobe that reflects or refracts: it can throw a caustic.
     pub fn is_specular(&self) -> bool {
         match self {

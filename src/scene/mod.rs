@@ -276,6 +276,15 @@ impl Scene {
         }
     }
 
+    /// Whether some surface scatters light about single directions, as rough metal and glass do.
+    pub fn is_glossy(&self) -> bool {
+        let used = |id: &MaterialId| self.materials.get(id.0 as usize);
+        self.surfaces
+            .iter()
+            .filter_map(used)
+            .any(Material::is_glossy)
+    }
+
     /// An aim, where that pays, of a share of the light at all that can throw a caustic.
     pub fn aim_partly_at_caustics(&self) -> Aim {
         let specular = |shape: &ShapeId| {

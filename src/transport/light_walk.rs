@@ -220,7 +220,7 @@ impl LightWalk<'_> {
                         true => mis::power(pdf.start_per_sr(dist2) / start),
                         false => 0.0,
                     },
-                    reverse_caustic: 0.0,
+                    cut_straight: 0.0,
                     cut: match self.techniques.next_event {
                         true => mis::power(connected() / start),
                         false => 0.0,
@@ -247,7 +247,7 @@ impl LightWalk<'_> {
             f64::from(hit.ng.dot(sample.wi).abs()),
             self.techniques.connection,
             // The eye's walk comes from where this goes, so it is scattered before.
-            [vertex.merging(&self.techniques, true), 0.0],
+            vertex.merging(&self.techniques, true),
         )
     }
 }
@@ -259,7 +259,7 @@ impl LightVertex {
     pub fn merging(&self, techniques: &Techniques, later: bool) -> f64 {
         match self.scattered {
             0 => 0.0,
-            _ => techniques.merging(self.specular, later),
+            _ => techniques.merging(later),
         }
     }
 

@@ -39,13 +39,13 @@ pub struct Techniques {
     pub splats: f64,
     /// Photons per iteration times the area of the disk that they are gathered from; 0 for none.
     pub merging: f64,
+    /// Share of its density that merging counts with where the eye's walk was scattered before, by other lobes
+    /// than delta ones. Such a walk hits a bright spot by chance and then finds many photons at once: they
+    /// are no independent samples, and the heuristic must not take them for such (Grittmann et al. 2021,
+    /// "Correlation-aware multiple importance sampling for bidirectional rendering algorithms"). 0: none is
+    /// merged there.
+    pub later: f64,
 }
-
-/// Share of its density that gathering photons of a caustic counts with where the eye's walk was scattered
-/// before. Such a walk hits a caustic by chance, and then finds many photons at once: they are no
-/// independent samples, and the heuristic must not take them for such (Grittmann et al. 2021,
-/// "Correlation-aware multiple importance sampling for bidirectional rendering algorithms").
-const LATER_CAUSTIC: f64 = 0.1;
 
 impl Techniques {
     /// Whether there is more than one, so that weights must be known.
@@ -53,12 +53,12 @@ impl Techniques {
         self.emission || self.next_event || self.connection || self.splats > 0.0
     }
 
-    /// What merging counts for with light that came by delta lobes alone, or not, and an eye's walk that
-    /// meets its first vertex without such a lobe, or a later one.
+    /// What merging counts for where the eye's walk was scattered before by other lobes than delta ones
+    /// (`later`), or not.
     #[inline]
-    pub fn merging(&self, caustic: bool, later: bool) -> f64 {
-        match caustic && later {
-            true => self.merging * LATER_CAUSTIC,
+    pub fn merging(&self, later: bool) -> f64 {
+        match later {
+            true => self.merging * self.later,
             false => self.merging,
         }
     }
@@ -71,11 +71,11 @@ pub struct State {
     pub pdf: f64,
     /// What the power of the density (per steradian) of going back from here is multiplied with.
     pub reverse: f64,
-    /// The same if light comes by delta lobes alone to the last vertex with any other.
-    pub reverse_caustic: f64,
     /// Density, relative to this walk's, of the cut just before this vertex, if it has a lobe that is not a
     /// delta one.
     pub cut: f64,
+    /// The same for light that comes here straight from an emitter.
+    pub cut_straight: f64,
 }
 
 /// What a walk knows on leaving a vertex.
@@ -84,9 +84,7 @@ pub struct Leg {
     /// Density per steradian of the direction.
     onward: f64,
     bracket: f64,
-    /// If light comes by delta lobes alone to the last vertex with any other: by at least one of these, and by
-    /// those so far.
-    bracket_caustic: f64,
+    /// If light is emitted at the next vertex.
     bracket_met: f64,
     cos: f64,
     cut: f64,
@@ -99,7 +97,13 @@ impl State {
         self.cut + power(back) * self.reverse
     }
 
-    /// That sum, and merging here if `merging` is its eta, over the density of this vertex: what the density
+    /// The same for light that comes here straight from an emitter.
+    #[inline]
+    pub fn sum_straight(&self, back: f64) -> f64 {
+        self.cut_straight + power(back) * self.reverse
+    }
+
+    /// [`State::sum`], and merging here if `merging` is its eta, over the density of this vertex: what the density
     /// with which the other walk makes this vertex is multiplied with.
     #[inline]
     pub fn bracket(&self, back: f64, merging: f64) -> f64 {
@@ -107,8 +111,7 @@ impl State {
     }
 
     /// Goes on with density `onward` in a direction at cosine `cos`; `back` is the density per steradian of
-    /// going back. `merging` is what merging here counts for: with light that is scattered by other lobes than
-    /// delta ones before it arrives, and with that of caustics.
+    /// going back. `merging` is what merging here counts for, and `cut` whether vertices are connected.
     #[inline]
     pub fn leave(
         &self,
@@ -116,25 +119,23 @@ impl State {
         back: impl FnOnce() -> f32,
         cos: f64,
         cut: bool,
-        merging: [f64; 2],
+        merging: f64,
     ) -> Leg {
         match onward {
             Density::Delta => Leg {
                 onward: 1.0,
                 bracket: self.reverse / power(self.pdf),
-                bracket_caustic: self.reverse_caustic / power(self.pdf),
-                bracket_met: self.reverse_caustic / power(self.pdf),
+                bracket_met: self.reverse / power(self.pdf),
                 cos,
                 cut: 0.0,
             },
             Density::PerSr(pdf) => {
-                let unmerged = self.sum(f64::from(back())) / power(self.pdf);
+                let back = f64::from(back());
                 Leg {
                     onward: f64::from(pdf),
-                    bracket: unmerged + power(merging[0]),
-                    bracket_caustic: unmerged + power(merging[1]),
+                    bracket: self.bracket(back, merging),
                     // Straight from an emitter, light is not merged.
-                    bracket_met: unmerged,
+                    bracket_met: self.sum_straight(back) / power(self.pdf),
                     cos,
                     cut: if cut { 1.0 } else { 0.0 },
                 }
@@ -159,8 +160,8 @@ impl Leg {
         State {
             pdf: self.onward * cos / dist2,
             reverse: back * self.bracket,
-            reverse_caustic: back * self.bracket_caustic,
             cut: self.cut,
+            cut_straight: self.cut,
         }
     }
 }

@@ -1,5 +1,8 @@
 //! Our scenes against pictures of them by Mitsuba 3.9.1 (made by `make.py` beside this file): pixel by
 //! pixel within the noise of both, and scale and mean within half a percent where the noise allows to tell.
+//! Those of caustics are luxel's own.
+
+mod caustics;
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -9,6 +12,7 @@ use luxel::math::Rgb;
 use luxel::render::Stop;
 use luxel::study::Picture;
 use luxel::study::z_test::{Noise, Rule, z_test};
+use luxel::transport::IntegratorSpec;
 
 const SPP: u64 = 256;
 const SIZE: [u32; 2] = [128, 80];
@@ -24,16 +28,27 @@ fn render(scene: &str) -> [Picture; 2] {
         seed: Some(1),
         ..Overrides::default()
     };
-    let desc =
-        format::load(&path(&format!("scenes/{scene}.xml")), &[]).unwrap_or_else(|e| panic!("{e}"));
-    let compiled = format::compile(&desc, &overrides).unwrap_or_else(|e| panic!("{e}"));
+    render_as(&format!("scenes/{scene}.xml"), &overrides, SPP, |_| ())
+}
+
+/// The same of the scene in `file`, with `spp` samples of the integrator after `change`.
+fn render_as(
+    file: &str,
+    overrides: &Overrides,
+    spp: u64,
+    change: impl Fn(&mut IntegratorSpec),
+) -> [Picture; 2] {
+    let desc = format::load(&path(file), &[]).unwrap_or_else(|e| panic!("{e}"));
+    let mut compiled = format::compile(&desc, overrides).unwrap_or_else(|e| panic!("{e}"));
+    change(&mut compiled.job.integrator);
     let (film, stats) = compiled
         .job
-        .render(Stop::Spp(SPP), |_, _| ControlFlow::Continue(()));
-    assert_eq!(stats.invalid.count, 0, "{scene}: {:?}", stats.invalid);
+        .render(Stop::Spp(spp), |_, _| ControlFlow::Continue(()));
+    assert_eq!(stats.invalid.count, 0, "{file}: {:?}", stats.invalid);
+    let window = film.window();
     let picture = |values: Vec<[f64; 3]>| Picture {
-        width: SIZE[0] as usize,
-        height: SIZE[1] as usize,
+        width: window.width as usize,
+        height: window.height as usize,
         pixels: values
             .into_iter()
             .map(|v| Rgb::from_array(v.map(|v| v as f32)))

@@ -39,7 +39,7 @@ impl Aim {
         // A quarter of the surface (Cauchy).
         let shadow = 2.0 * (half.x * half.y + half.y * half.z + half.z * half.x);
         let covered = std::f64::consts::PI * area / shadow;
-        let share = match covered < COVERED {
+        let share = match covered > 0.0 && covered < COVERED {
             true => LARGEST_SHARE * (1.0 - covered / COVERED),
             // Also where either is no number.
             false => 0.0,

@@ -1,7 +1,7 @@
 //! Light from infinity, as it enters the scene: through the box around it.
 
 use super::super::{Emitter, Lights};
-use super::{Aim, Densities, Emission, EmissionNumbers, EmissionPdf, Source};
+use super::{Aim, Densities, Emission, EmissionNumbers, Source};
 use crate::geom::{Hit, Ray};
 use crate::math::{Aabb, DVec3, Vec2, Vec3, fp, warp};
 
@@ -191,7 +191,7 @@ impl Lights {
     }
 
     /// Densities of light from the direction `wi` at infinity that arrives at `at`.
-    pub(super) fn pdf_sky_emission(&self, aim: &Aim, at: &Hit, wi: Vec3) -> Option<EmissionPdf> {
+    pub(super) fn pdf_sky_emission(&self, aim: &Aim, at: &Hit, wi: Vec3) -> Densities {
         self.pdf_entering(aim, at, wi, self.pdf_sky(wi), true)
     }
 
@@ -202,9 +202,9 @@ impl Lights {
         at: &Hit,
         wi: Vec3,
         emitter: u32,
-    ) -> Option<EmissionPdf> {
+    ) -> Option<Densities> {
         let index = self.far.emitters.iter().position(|&e| e == emitter)?;
-        self.pdf_entering(aim, at, wi, self.sources.prob_of_far(index), false)
+        Some(self.pdf_entering(aim, at, wi, self.sources.prob_of_far(index), false))
     }
 
     /// Densities of light from the direction `wi` with this density or probability of its start.
@@ -215,7 +215,7 @@ impl Lights {
         wi: Vec3,
         start: f64,
         can_be_met: bool,
-    ) -> Option<EmissionPdf> {
+    ) -> Densities {
         let (p, d) = (at.p.as_dvec3(), -wi.as_dvec3());
         Densities {
             start,
@@ -224,6 +224,5 @@ impl Lights {
             diverges: false,
             can_be_met,
         }
-        .rounded()
     }
 }

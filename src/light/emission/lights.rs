@@ -32,8 +32,9 @@ impl Lights {
         }
     }
 
-    /// As [`Lights::sample`], with the densities of the light that would have come from there by emission, and
-    /// the probability of the choice of the light.
+    /// As [`Lights::sample`], with the densities of the light that would have come from there by emission (that
+    /// of its direction is 0 where all light is aimed elsewhere), and the probability of the choice of the
+    /// light.
     pub fn sample_both_ways(
         &self,
         geoms: &[Geometry],
@@ -48,11 +49,11 @@ impl Lights {
                 let sample = self.sample_far(emitter, u, share)?;
                 let pdf = match self.emitters[emitter as usize] {
                     Emitter::Directional { .. } => {
-                        self.pdf_parallel_emission(aim, from, sample.wi, emitter)
+                        self.pdf_parallel_emission(aim, from, sample.wi, emitter)?
                     }
                     _ => self.pdf_sky_emission(aim, from, sample.wi),
-                }?;
-                return Some((sample, pdf, share));
+                };
+                return Some((sample, pdf.stated(), share));
             }
             (None, share, rest) => {
                 let (index, prob) = self.choice.pick(from, rest)?;
@@ -61,7 +62,7 @@ impl Lights {
         };
         let sample = self.sample_item(geoms, from, index, prob, u)?;
         let pdf = self.pdf_of_connection(geoms, aim, from, index, &sample)?;
-        Some((sample, pdf.rounded()?, prob))
+        Some((sample, pdf.stated(), prob))
     }
 
     /// Densities of the emission from the end of a connection to item `index`.
@@ -137,7 +138,7 @@ impl Lights {
 
     /// The same for light from infinity that arrives at `at` from the direction `wi`.
     pub fn pdf_emission_escaped(&self, aim: &Aim, at: &Hit, wi: Vec3) -> Option<EmissionPdf> {
-        self.pdf_sky_emission(aim, at, wi)
+        self.pdf_sky_emission(aim, at, wi).rounded()
     }
 
     /// Density with which [`Lights::sample`] connects `from` to `source`, in the measure of

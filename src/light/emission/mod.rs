@@ -113,13 +113,20 @@ impl Densities {
     /// `None` where either is zero: nothing is emitted like this.
     fn rounded(&self) -> Option<EmissionPdf> {
         let possible = self.start > 0.0 && self.onward > 0.0 && self.cos > 0.0;
-        possible.then(|| EmissionPdf {
+        possible.then(|| self.stated())
+    }
+
+    /// The same for a start that is found otherwise; where nothing would be emitted from there in this
+    /// direction, since all light is aimed elsewhere, the density of the direction is 0.
+    fn stated(&self) -> EmissionPdf {
+        EmissionPdf {
             start: local::bounded(self.start),
             onward: local::bounded(self.onward),
-            cos: local::bounded(self.cos),
+            // Seen edge on, the cosine may round to 0, which others divide by.
+            cos: local::bounded(self.cos.max(f64::from(f32::MIN_POSITIVE))),
             diverges: self.diverges,
             can_be_met: self.can_be_met,
-        })
+        }
     }
 
     /// The emission of `le` (radiance, intensity or irradiance) along `ray`. `None` where there is none.

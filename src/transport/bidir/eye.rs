@@ -129,7 +129,7 @@ impl EyeWalk<'_> {
                 || vertex.pdf_back(scene, sample.wi),
                 f64::from(hit.ng.dot(sample.wi).abs()),
                 self.techniques.connection,
-                [false, true].map(|caustic| self.techniques.merging(caustic, later)),
+                self.techniques.merging(later),
             );
             later |= sample.density != Density::Delta;
             ray = hit.spawn(sample.wi);
@@ -157,6 +157,8 @@ impl EyeWalk<'_> {
                 State {
                     pdf: f64::from(importance) * cos,
                     cut: mis::power(self.techniques.splats),
+                    // Connecting to the emitter does better.
+                    cut_straight: 0.0,
                     ..State::default()
                 }
             }

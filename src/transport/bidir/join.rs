@@ -23,13 +23,14 @@ pub struct Photon {
     power: Rgb,
     /// Edges behind it.
     edges: u32,
-    /// Whether it came by delta lobes alone.
-    caustic: bool,
     /// Weight of the techniques that cut the path just before the photon, and of those before that, over the
     /// power of the density of going back; relative to merging here.
     cut: f32,
     reverse: f32,
 }
+
+// A map adds the point: 60 bytes in all, which the README states.
+const _: () = assert!(size_of::<Photon>() == 48);
 
 impl Photon {
     /// `merging` as in [`Techniques`].
@@ -40,7 +41,6 @@ impl Photon {
             ng: vertex.hit.ng,
             power: vertex.power,
             edges: vertex.edges,
-            caustic: vertex.specular,
             cut: ratio(vertex.state.cut, here),
             reverse: ratio(vertex.state.reverse, here),
         }
@@ -103,6 +103,12 @@ impl EyeVertex {
         seen.eval_pdf(self.hit.wo, Mode::Importance).1
     }
 }
+
+/// Weight of a connection that is always looked along; of those that weigh less, Russian roulette leaves a part.
+const WORTH_A_RAY: f64 = 0.2;
+
+/// Its multiples are spread evenly over the unit interval, whole numbers left out.
+const GOLDEN_RATIO: f32 = 0.618_034;
 
 /// The numbers that choose the point of the lens that a walk of light is connected to.
 pub fn lens_numbers(sampler: &Sampler) -> Vec2 {
@@ -167,12 +173,15 @@ impl EyeWalk<'_> {
         add(Technique::NextEvent, lit, ledger);
         if self.techniques.connection {
             let mut lit = Rgb::BLACK;
-            for light in self.light {
-                lit += self.connect(vertex, light, ledger);
+            for (i, light) in self.light.iter().enumerate() {
+                // A number of its own for each, as well spread as one number allows.
+                let u = (u.roulette + i as f32 * GOLDEN_RATIO).fract();
+                lit += self.connect(vertex, light, u, ledger);
             }
             add(Technique::Connection, lit, ledger);
         }
-        if let Some(photons) = self.photons {
+        let merges = self.techniques.merging(vertex.later) > 0.0;
+        if let Some(photons) = self.photons.filter(|_| merges) {
             add(Technique::Merging, self.merge(vertex, photons), ledger);
         }
         sum
@@ -208,12 +217,13 @@ impl EyeWalk<'_> {
         let cos = f64::from(hit.ng.dot(light.wi).abs());
         let walked = f64::from(emitted.start) * emitted.arrival(dist2, cos) / connected;
         // Light straight from an emitter is not merged.
-        let rivals = met + mis::power(walked) * vertex.state.bracket(f64::from(back), 0.0);
+        let ahead = vertex.state.sum_straight(f64::from(back)) / mis::power(vertex.state.pdf);
+        let rivals = met + mis::power(walked) * ahead;
         f_cos * light.weight() * (seen / (1.0 + rivals) as f32)
     }
 
     /// Light that arrives from a vertex of light.
-    fn connect(&self, vertex: &EyeVertex, light: &LightVertex, ledger: &mut Ledger) -> Rgb {
+    fn connect(&self, vertex: &EyeVertex, light: &LightVertex, u: f32, ledger: &mut Ledger) -> Rgb {
         let scene = self.engine.setting.scene;
         let edges = vertex.edges + light.edges + 1;
         let Some(passes) = self.engine.max_depth.checked_sub(edges) else {
@@ -231,6 +241,23 @@ impl EyeWalk<'_> {
         if scattered.is_black() {
             return Rgb::BLACK;
         }
+        let cos_here = f64::from(hit.ng.dot(wi).abs());
+        let cos_there = f64::from(from.ng.dot(wi).abs());
+        let (_, light_pdf) = light.shading.eval_pdf(-wi, Mode::Importance);
+        let there = f64::from(pdf) * cos_there / dist2;
+        let here = f64::from(light_pdf) * cos_here / dist2;
+        let merging = light.merging(&self.techniques, true);
+        let rivals = mis::power(there) * light.state.bracket(f64::from(light_back), merging)
+            + mis::power(here)
+                * vertex
+                    .state
+                    .bracket(f64::from(back), self.techniques.merging(vertex.later));
+        // What other techniques find better is not worth a ray each time.
+        let weight = 1.0 / (1.0 + rivals);
+        let survival = (weight / WORTH_A_RAY).min(1.0);
+        if f64::from(u) >= survival {
+            return Rgb::BLACK;
+        }
         let end = Endpoint {
             p: from.p,
             p_err: from.p_err,
@@ -241,19 +268,7 @@ impl EyeWalk<'_> {
         if seen == 0.0 {
             return Rgb::BLACK;
         }
-        let cos_here = f64::from(hit.ng.dot(wi).abs());
-        let cos_there = f64::from(from.ng.dot(wi).abs());
-        let (_, light_pdf) = light.shading.eval_pdf(-wi, Mode::Importance);
-        let there = f64::from(pdf) * cos_there / dist2;
-        let here = f64::from(light_pdf) * cos_here / dist2;
-        let merging = light.merging(&self.techniques, true);
-        let rivals = mis::power(there) * light.state.bracket(f64::from(light_back), merging)
-            + mis::power(here)
-                * vertex.state.bracket(
-                    f64::from(back),
-                    self.techniques.merging(false, vertex.later),
-                );
-        let weight = f64::from(seen) / (dist2 * (1.0 + rivals));
+        let weight = f64::from(seen) * weight / (survival * dist2);
         f_cos * light.power * scattered * weight as f32
     }
 
@@ -291,36 +306,33 @@ impl EyeWalk<'_> {
 
 /// What the weights of all photons at one vertex of the eye's walk share.
 struct Gather {
-    /// Power of the density of merging there over that of the walk behind it: for light that came by other
-    /// lobes than delta ones, and for caustics.
-    here: [f64; 2],
+    /// Power of the density of merging there over that of the walk behind it.
+    here: f64,
     /// What turns a photon's weights, for an eye's walk that was not scattered before, into those of this.
-    scale: [f32; 2],
+    scale: f32,
 }
 
 impl Gather {
     fn new(techniques: &Techniques, vertex: &EyeVertex) -> Gather {
-        let merging = [false, true].map(|caustic| techniques.merging(caustic, vertex.later));
+        let merging = techniques.merging(vertex.later);
         Gather {
-            here: merging.map(|merging| mis::power(vertex.state.pdf * merging)),
-            scale: merging.map(|merging| mis::power(techniques.merging / merging) as f32),
+            here: mis::power(vertex.state.pdf * merging),
+            scale: mis::power(techniques.merging / merging) as f32,
         }
     }
 
     /// Sum of the techniques that cut the path on the eye's side, relative to merging here; `back` is the
     /// density with which light goes on to the eye.
     #[inline]
-    fn ahead(&self, vertex: &EyeVertex, back: f32) -> [f32; 2] {
-        let sum = vertex.state.sum(f64::from(back));
-        self.here.map(|here| ratio(sum, here))
+    fn ahead(&self, vertex: &EyeVertex, back: f32) -> f32 {
+        ratio(vertex.state.sum(f64::from(back)), self.here)
     }
 
     /// Weight of merging with `photon`; `pdf` is the density with which the eye's walk goes on to where it
     /// came from.
     #[inline]
-    fn weight(&self, photon: &Photon, pdf: f32, ahead: [f32; 2]) -> f32 {
-        let class = usize::from(photon.caustic);
-        let behind = (photon.cut + pdf * pdf * photon.reverse) * self.scale[class];
-        1.0 / (1.0 + behind + ahead[class])
+    fn weight(&self, photon: &Photon, pdf: f32, ahead: f32) -> f32 {
+        let behind = (photon.cut + pdf * pdf * photon.reverse) * self.scale;
+        1.0 / (1.0 + behind + ahead)
     }
 }

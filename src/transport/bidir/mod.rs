@@ -117,6 +117,10 @@ impl<'a> Engine<'a> {
             connection: both,
             splats,
             merging: 0.0,
+            later: match setting.scene.is_glossy() {
+                true => LATER,
+                false => 0.0,
+            },
         };
         let radius = match spec.photons.radius {
             _ if !spec.method.merges() => 0.0,
@@ -126,7 +130,10 @@ impl<'a> Engine<'a> {
         Engine {
             spec,
             setting,
-            aim: setting.scene.aim_partly_at_caustics(),
+            aim: match setting.scene.aim_partly_at_caustics() {
+                aim if aim.share > AIM_PAYS => aim,
+                _ => Aim::default(),
+            },
             max_depth: spec.max_depth.unwrap_or(UNBOUNDED),
             techniques,
             walks,
@@ -258,7 +265,9 @@ impl<'a> Engine<'a> {
                 if vertex.shading.bsdf.is_delta() {
                     return true;
                 }
-                if techniques.splats > 0.0 {
+                // Light straight from an emitter, next-event estimation finds with less noise.
+                let straight = techniques.next_event && vertex.scattered == 0;
+                if techniques.splats > 0.0 && !straight {
                     self.splat(&techniques, vertex, lens, ledger);
                 }
                 if techniques.connection {
@@ -269,6 +278,16 @@ impl<'a> Engine<'a> {
         ledger.rays += rays;
     }
 }
+
+/// [`Techniques::later`] in a scene with glossy surfaces, behind which photons are worth gathering. Without, it
+/// costs as much as it gains at equal numbers of samples (measured on a diffuse box with balls of glass and
+/// gold: a third of the time, no change of the error).
+const LATER: f64 = 0.1;
+
+/// Share of [`Aim::around`] from which on, that is for small targets, aiming pays for the time that the
+/// densities of both walks take. With balls that cover a seventh of a box it cost a third more time, and
+/// brought nothing.
+const AIM_PAYS: f32 = 0.45;
 
 /// Radius of the first iteration's disk in pixels.
 const RADIUS_IN_PIXELS: f32 = 3.0;
