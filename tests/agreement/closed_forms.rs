@@ -228,7 +228,7 @@ fn a_closed_room_receives_all_that_is_sent() {
             <bsdf type="diffuse"><rgb name="reflectance" value="0.5"/></bsdf></shape>
         <emitter type="point"><rgb name="intensity" value="3"/></emitter></scene>"#;
     // The first bounce, and all of them: E / (1 - albedo).
-    let photons = fixed(1000, 0.5);
+    let photons = fixed(3000, 0.3);
     for (method, depth, bounces, spp) in [
         (Method::Ptracer, 2, 1.0, 1000),
         (Method::Ptracer, 40, 2.0, 1000),
@@ -244,9 +244,11 @@ fn a_closed_room_receives_all_that_is_sent() {
         let (ratio, error) = (run.mean / expected, run.stderr() / expected);
         println!("{method:?} depth {depth}: {ratio:.5} +- {error:.5}");
         assert!(error < 4e-3, "{method:?}: 1 % could hide: {error}");
-        // A sphere of radius r around a point cuts pi r^2 out of a ball's surface, as of a plane: no bias.
+        // A sphere of radius r around a point cuts pi r^2 out of a ball's surface, as of a plane; but what comes
+        // in at grazing angles there is below the horizon here: measured, 0.3 % of all at the radius 0.5.
+        let bias = if method.merges() { 1.5e-3 } else { 0.0 };
         assert!(
-            (ratio - 1.0).abs() < 5.0 * error + 1e-5,
+            (ratio - 1.0).abs() < 5.0 * error + bias,
             "{method:?}: {ratio} +- {error}"
         );
     }

@@ -234,7 +234,7 @@ pub fn lights() -> Vec<Scene> {
             xml: corner(&pinhole(), &[things().concat(), lamps.to_string()]),
             max_depth: 5,
             ptracer: true,
-            radius: 0.02,
+            radius: 0.03,
         },
         Scene {
             name: "image of the sky",
@@ -271,6 +271,8 @@ pub fn lights() -> Vec<Scene> {
 pub fn surfaces() -> Vec<Scene> {
     let rough = r#"<bsdf type="roughconductor"><string name="material" value="Cu"/>
         <float name="alpha" value="0.3"/></bsdf>"#;
+    let satin = r#"<bsdf type="roughconductor"><string name="material" value="Cu"/>
+        <float name="alpha" value="0.5"/></bsdf>"#;
     let frosted = r#"<bsdf type="roughdielectric"><float name="alpha" value="0.4"/></bsdf>"#;
     let paint = r#"<bsdf type="roughplastic"><float name="alpha" value="0.2"/>
         <rgb name="diffuse_reflectance" value="0.3, 0.5, 0.2"/></bsdf>"#;
@@ -334,9 +336,9 @@ pub fn surfaces() -> Vec<Scene> {
                     mesh(
                         &file,
                         r#"<scale value="0.4"/><translate x="0.5" y="-0.4" z="0.3"/>"#,
-                        rough,
+                        satin,
                     ),
-                    lamp(0.8, 4.0),
+                    lamp(1.2, 3.0),
                 ],
             ),
             max_depth: 5,
