@@ -45,7 +45,7 @@ const PHOTON_COUNT: Param = Param::optional(
 const INITIAL_RADIUS: Param = Param::optional(
     "initial_radius",
     Kind::Float(Range::NonNegative),
-    "Radius that photons are gathered from in the first iteration, in scene units; without it or 0, two pixels as the camera sees the scene.",
+    "Radius that photons are gathered from in the first iteration, in scene units; without it or 0, a few pixels as the camera sees the scene.",
 );
 const ALPHA: Param = Param::float(
     "alpha",
