@@ -190,7 +190,7 @@ pub fn indoors() -> Vec<Scene> {
             xml: scene(&pinhole(), &room),
             max_depth: 6,
             ptracer: true,
-            radius: 0.01,
+            radius: 0.015,
         },
         Scene {
             name: "glass and mirror balls",
@@ -204,14 +204,14 @@ pub fn indoors() -> Vec<Scene> {
             ),
             max_depth: 8,
             ptracer: false,
-            radius: 0.02,
+            radius: 0.03,
         },
         Scene {
             name: "textured lamp",
             xml: corner(&pinhole(), &[things().concat(), screen]),
             max_depth: 5,
             ptracer: true,
-            radius: 0.02,
+            radius: 0.03,
         },
     ]
 }
@@ -306,7 +306,7 @@ pub fn surfaces() -> Vec<Scene> {
             ),
             max_depth: 6,
             ptracer: true,
-            radius: 0.015,
+            radius: 0.025,
         },
         Scene {
             name: "surfaces with lobes of both kinds",
@@ -320,7 +320,7 @@ pub fn surfaces() -> Vec<Scene> {
             ),
             max_depth: 5,
             ptracer: false,
-            radius: 0.02,
+            radius: 0.03,
         },
         Scene {
             name: "bent normals",
@@ -343,7 +343,7 @@ pub fn surfaces() -> Vec<Scene> {
             ),
             max_depth: 5,
             ptracer: true,
-            radius: 0.015,
+            radius: 0.025,
         },
         Scene {
             name: "masks and panes",
@@ -405,7 +405,7 @@ pub fn cameras() -> Vec<Scene> {
             xml: corner(&pinhole(), &ball_of(&diffuse(0.7, 0.3, 0.2))),
             max_depth: 5,
             ptracer: true,
-            radius: 0.02,
+            radius: 0.03,
         },
         Scene {
             name: "moving glass ball and a lens",
