@@ -4,6 +4,8 @@
 //! 0.4 %, so that an error of 1 % would not hide; from the spread of these runs follow the standard errors of
 //! the mean and of blocks of pixels, whatever the pixels' samples have to do with each other.
 
+use std::collections::BTreeMap;
+
 use luxel::format::Compiled;
 use luxel::transport::{IntegratorSpec, Method};
 
@@ -72,6 +74,33 @@ fn compare(a: &[Running], b: &[Running], bias: [f64; 2]) -> Result<String, Strin
     if fits { Ok(report) } else { Err(report) }
 }
 
+/// Relative differences of means over several scenes: what one scene alone would explain by chance.
+#[derive(Default)]
+struct Gaps {
+    count: f64,
+    sum: f64,
+    variance: f64,
+    bias: f64,
+}
+
+impl Gaps {
+    fn add(&mut self, a: &Running, b: &Running, bias: f64) {
+        self.count += 1.0;
+        self.sum += a.mean / b.mean - 1.0;
+        self.variance += (a.stderr().powi(2) + b.stderr().powi(2)) / b.mean.powi(2);
+        self.bias = bias;
+    }
+
+    fn mean(&self) -> f64 {
+        self.sum / self.count
+    }
+
+    fn score(&self) -> f64 {
+        let gap = self.sum.abs() - self.count * self.bias;
+        gap.max(0.0) / self.variance.sqrt()
+    }
+}
+
 /// Integrators, how many samples a run has, and the bias that blocks and whole may have.
 fn integrators(scene: &Scene) -> Vec<(IntegratorSpec, u64, [f64; 2])> {
     let depth = scene.max_depth;
@@ -92,6 +121,7 @@ fn integrators(scene: &Scene) -> Vec<(IntegratorSpec, u64, [f64; 2])> {
 
 fn check(scenes: &[Scene]) {
     let mut failed = Vec::new();
+    let mut together: BTreeMap<&str, Gaps> = BTreeMap::new();
     for scene in scenes {
         let mut compiled = render::compile(&scene.xml);
         let reference = IntegratorSpec::Path(path(scene.max_depth));
@@ -103,12 +133,24 @@ fn check(scenes: &[Scene]) {
             let start = std::time::Instant::now();
             let got = measure(&mut compiled, &spec, spp, STANDARD_ERROR);
             let result = compare(&got, &expected, bias);
+            let gaps = together.entry(spec.name()).or_default();
+            gaps.add(&got[WHOLE], &expected[WHOLE], bias[1]);
             let (Ok(report) | Err(report)) = &result;
             let line = format!("{}, {}: {report}", scene.name, spec.name());
             println!("{line} ({:.1} s)", start.elapsed().as_secs_f64());
             if result.is_err() {
                 failed.push(line);
             }
+        }
+    }
+    for (name, gaps) in together {
+        let z = gaps.score();
+        println!(
+            "{name}, all together: mean gap {:.4}, z {z:.1}",
+            gaps.mean()
+        );
+        if z >= LIMIT {
+            failed.push(format!("{name}, all together: z {z:.1}"));
         }
     }
     assert!(failed.is_empty(), "{}", failed.join("\n"));
