@@ -1,6 +1,7 @@
 //! Small scenes that have one thing each that integrators may see differently. All are 24 x 24 pixels.
 
 /// A picture of a scene, and what is asked of it.
+#[derive(Clone)]
 pub struct Scene {
     pub name: &'static str,
     pub xml: String,
