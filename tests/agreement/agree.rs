@@ -74,8 +74,8 @@ fn compare(a: &[Running], b: &[Running], bias: [f64; 2]) -> Result<String, Strin
     if fits { Ok(report) } else { Err(report) }
 }
 
-/// Relative differences of means over all scenes, most of which one scene alone would explain by chance: tried
-/// with splats of light tracing 1 % too bright, its standard score is 7.
+/// Relative differences of means over all scenes, most of which one scene alone would explain by chance. With splats
+/// of light tracing 1 % too bright the four groups of scenes scored 4.3, 4.1, 3.2 and 2.0: about 7 together.
 #[derive(Default)]
 struct Gaps {
     count: f64,
