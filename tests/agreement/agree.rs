@@ -4,6 +4,8 @@
 //! 0.4 %, so that an error of 1 % would not hide; from the spread of these runs follow the standard errors of
 //! the mean and of blocks of pixels, whatever the pixels' samples have to do with each other.
 
+use std::collections::BTreeMap;
+
 use luxel::format::Compiled;
 use luxel::transport::{IntegratorSpec, Method};
 
@@ -18,9 +20,11 @@ const BLOCKS: usize = 4;
 const WHOLE: usize = BLOCKS * BLOCKS;
 /// Of the mean, relative.
 const STANDARD_ERROR: f64 = 3.8e-3;
+/// Of the reference, which all are compared with.
+const REFERENCE_ERROR: f64 = 2e-3;
 /// At least: for Student's t of twice as many degrees of freedom 4.5 is exceeded once in 40,000.
 const RUNS: u64 = 40;
-const MOST_RUNS: u64 = 1600;
+const MOST_RUNS: u64 = 3200;
 const LIMIT: f64 = 4.5;
 
 /// Means over blocks and over the whole.
@@ -35,13 +39,13 @@ fn blocks(picture: &[[f64; 3]]) -> [f64; WHOLE + 1] {
     means
 }
 
-fn measure(compiled: &mut Compiled, spec: &IntegratorSpec, spp: u64) -> Vec<Running> {
+fn measure(compiled: &mut Compiled, spec: &IntegratorSpec, spp: u64, error: f64) -> Vec<Running> {
     let mut all = vec![Running::default(); WHOLE + 1];
     for seed in 0..MOST_RUNS {
         let means = blocks(&picture(compiled, spec, spp, seed));
         all.iter_mut().zip(means).for_each(|(run, v)| run.add(v));
         let whole = &all[WHOLE];
-        if seed + 1 >= RUNS && whole.stderr() < STANDARD_ERROR * whole.mean {
+        if seed + 1 >= RUNS && whole.stderr() < error * whole.mean {
             break;
         }
     }
@@ -70,6 +74,34 @@ fn compare(a: &[Running], b: &[Running], bias: [f64; 2]) -> Result<String, Strin
     if fits { Ok(report) } else { Err(report) }
 }
 
+/// Relative differences of means over all scenes, most of which one scene alone would explain by chance. With splats
+/// of light tracing 1 % too bright the four groups of scenes scored 4.3, 4.1, 3.2 and 2.0: about 7 together.
+#[derive(Default)]
+struct Gaps {
+    count: f64,
+    sum: f64,
+    variance: f64,
+    bias: f64,
+}
+
+impl Gaps {
+    fn add(&mut self, a: &Running, b: &Running, bias: f64) {
+        self.count += 1.0;
+        self.sum += a.mean / b.mean - 1.0;
+        self.variance += (a.stderr().powi(2) + b.stderr().powi(2)) / b.mean.powi(2);
+        self.bias = bias;
+    }
+
+    fn mean(&self) -> f64 {
+        self.sum / self.count
+    }
+
+    fn score(&self) -> f64 {
+        let gap = self.sum.abs() - self.count * self.bias;
+        gap.max(0.0) / self.variance.sqrt()
+    }
+}
+
 /// Integrators, how many samples a run has, and the bias that blocks and whole may have.
 fn integrators(scene: &Scene) -> Vec<(IntegratorSpec, u64, [f64; 2])> {
     let depth = scene.max_depth;
@@ -78,29 +110,32 @@ fn integrators(scene: &Scene) -> Vec<(IntegratorSpec, u64, [f64; 2])> {
     // A disk of photons is seen over the rim of a block and cut at the edges of surfaces.
     let biased = [0.02, 0.005];
     let mut all = vec![
-        (of(Method::Bdpt), 4, [0.0; 2]),
-        (of(Method::Vcm), 2, biased),
-        (of(Method::Sppm), 2, biased),
+        (of(Method::Bdpt), 2, [0.0; 2]),
+        (of(Method::Vcm), 1, biased),
+        (of(Method::Sppm), 1, biased),
     ];
     if scene.ptracer {
-        all.push((of(Method::Ptracer), 8, [0.0; 2]));
+        all.push((of(Method::Ptracer), 4, [0.0; 2]));
     }
     all
 }
 
 fn check(scenes: &[Scene]) {
     let mut failed = Vec::new();
+    let mut together: BTreeMap<&str, Gaps> = BTreeMap::new();
     for scene in scenes {
         let mut compiled = render::compile(&scene.xml);
         let reference = IntegratorSpec::Path(path(scene.max_depth));
-        let expected = measure(&mut compiled, &reference, 8);
+        let expected = measure(&mut compiled, &reference, 4, REFERENCE_ERROR);
         let whole = &expected[WHOLE];
         let error = whole.stderr() / whole.mean;
-        assert!(error < 4e-3, "{}: 1 % could hide: {error}", scene.name);
+        assert!(error < 2.2e-3, "{}: 1 % could hide: {error}", scene.name);
         for (spec, spp, bias) in integrators(scene) {
             let start = std::time::Instant::now();
-            let got = measure(&mut compiled, &spec, spp);
+            let got = measure(&mut compiled, &spec, spp, STANDARD_ERROR);
             let result = compare(&got, &expected, bias);
+            let gaps = together.entry(spec.name()).or_default();
+            gaps.add(&got[WHOLE], &expected[WHOLE], bias[1]);
             let (Ok(report) | Err(report)) = &result;
             let line = format!("{}, {}: {report}", scene.name, spec.name());
             println!("{line} ({:.1} s)", start.elapsed().as_secs_f64());
@@ -109,25 +144,26 @@ fn check(scenes: &[Scene]) {
             }
         }
     }
+    for (name, gaps) in together {
+        let z = gaps.score();
+        println!(
+            "{name}, all together: mean gap {:.4}, z {z:.1}",
+            gaps.mean()
+        );
+        if z >= LIMIT {
+            failed.push(format!("{name}, all together: z {z:.1}"));
+        }
+    }
     assert!(failed.is_empty(), "{}", failed.join("\n"));
 }
 
 #[test]
-fn indoors() {
-    check(&scenes::indoors());
-}
-
-#[test]
-fn lights() {
-    check(&scenes::lights());
-}
-
-#[test]
-fn surfaces() {
-    check(&scenes::surfaces());
-}
-
-#[test]
-fn cameras() {
-    check(&scenes::cameras());
+fn all_integrators_see_the_same() {
+    let groups = [
+        scenes::indoors(),
+        scenes::lights(),
+        scenes::surfaces(),
+        scenes::cameras(),
+    ];
+    check(&groups.concat());
 }

@@ -102,9 +102,9 @@ fn a_ring_throws_the_curve_that_theory_draws() {
     for (spec, spp) in [
         (
             bidirectional(Method::Ptracer, 3, PhotonSpec::default()),
-            400,
+            300,
         ),
-        (bidirectional(Method::Sppm, 3, fixed(40_000, 0.01)), 2),
+        (bidirectional(Method::Sppm, 3, fixed(25_000, 0.01)), 2),
     ] {
         let what = spec.name();
         let columns = measured(&ring(), &spec, spp, 16);
@@ -200,8 +200,8 @@ fn a_ball_gathers_light_as_a_lens_does() {
             bidirectional(Method::Ptracer, 4, PhotonSpec::default()),
             400,
         ),
-        (bidirectional(Method::Sppm, 4, fixed(20_000, 0.03)), 4),
-        (super::combined(4, fixed(20_000, 0.03)), 4),
+        (bidirectional(Method::Sppm, 4, fixed(20_000, 0.03)), 2),
+        (super::combined(4, fixed(20_000, 0.03)), 2),
     ] {
         let what = spec.name();
         let run = &measured(&lens(), &spec, spp, 1)[0];
@@ -230,13 +230,12 @@ fn a_closed_room_receives_all_that_is_sent() {
     // The first bounce, and all of them: E / (1 - albedo).
     let photons = fixed(3000, 0.3);
     for (method, depth, bounces, spp) in [
-        (Method::Ptracer, 2, 1.0, 1000),
-        (Method::Ptracer, 40, 2.0, 1000),
+        (Method::Ptracer, 2, 1.0, 500),
+        (Method::Ptracer, 40, 2.0, 500),
         (Method::Bdpt, 40, 2.0, 20),
-        (Method::Vcm, 3, 1.5, 10),
-        (Method::Vcm, 40, 2.0, 10),
-        (Method::Sppm, 3, 1.5, 10),
-        (Method::Sppm, 40, 2.0, 10),
+        (Method::Vcm, 40, 2.0, 6),
+        (Method::Sppm, 3, 1.5, 6),
+        (Method::Sppm, 40, 2.0, 6),
     ] {
         let expected = 0.5 / std::f64::consts::PI * 3.0 / 4.0 * bounces;
         let spec = bidirectional(method, depth, photons.clone());

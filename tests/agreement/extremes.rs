@@ -140,7 +140,7 @@ fn the_smallest_lamp() {
     let reference = mean(&mut compiled, &IntegratorSpec::Path(path(DEPTH)), 48);
     for (name, spec) in with(fixed(500, 0.03)).into_iter().chain(without(true)) {
         assert_same(
-            &mean(&mut compiled, &spec, 24),
+            &mean(&mut compiled, &spec, 12),
             &reference,
             0.01,
             &format!("{name}, tiny lamp"),
@@ -150,10 +150,10 @@ fn the_smallest_lamp() {
     let mut compiled = scene(1.0, &format!("{tiny}{}", ball(GLASS)));
     let mut specs = with(fixed(2000, 0.02));
     let (_, first) = specs.remove(0);
-    let reference = mean(&mut compiled, &first, 16);
+    let reference = mean(&mut compiled, &first, 10);
     for (name, spec) in specs {
         let what = format!("{name}, caustics of a tiny lamp");
-        assert_same(&mean(&mut compiled, &spec, 16), &reference, 0.02, &what);
+        assert_same(&mean(&mut compiled, &spec, 10), &reference, 0.02, &what);
     }
 }
 
@@ -195,11 +195,11 @@ fn glass_that_hardly_bends_light() {
     for method in [Method::Bdpt, Method::Vcm, Method::Sppm] {
         let spec = bidirectional(method, DEPTH + 4, photons.clone());
         let what = format!("{method:?} through hardly any glass");
-        assert_same(&mean(&mut glass, &spec, 24), &reference, 0.02, &what);
+        assert_same(&mean(&mut glass, &spec, 12), &reference, 0.02, &what);
     }
     let spec = combined(DEPTH + 4, photons);
     assert_same(
-        &mean(&mut glass, &spec, 24),
+        &mean(&mut glass, &spec, 12),
         &reference,
         0.02,
         "combined through hardly any glass",

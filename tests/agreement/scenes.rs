@@ -1,6 +1,7 @@
 //! Small scenes that have one thing each that integrators may see differently. All are 24 x 24 pixels.
 
 /// A picture of a scene, and what is asked of it.
+#[derive(Clone)]
 pub struct Scene {
     pub name: &'static str,
     pub xml: String,
@@ -190,7 +191,7 @@ pub fn indoors() -> Vec<Scene> {
             xml: scene(&pinhole(), &room),
             max_depth: 6,
             ptracer: true,
-            radius: 0.01,
+            radius: 0.015,
         },
         Scene {
             name: "glass and mirror balls",
@@ -204,14 +205,14 @@ pub fn indoors() -> Vec<Scene> {
             ),
             max_depth: 8,
             ptracer: false,
-            radius: 0.02,
+            radius: 0.03,
         },
         Scene {
             name: "textured lamp",
             xml: corner(&pinhole(), &[things().concat(), screen]),
             max_depth: 5,
             ptracer: true,
-            radius: 0.02,
+            radius: 0.03,
         },
     ]
 }
@@ -306,7 +307,7 @@ pub fn surfaces() -> Vec<Scene> {
             ),
             max_depth: 6,
             ptracer: true,
-            radius: 0.015,
+            radius: 0.025,
         },
         Scene {
             name: "surfaces with lobes of both kinds",
@@ -320,7 +321,7 @@ pub fn surfaces() -> Vec<Scene> {
             ),
             max_depth: 5,
             ptracer: false,
-            radius: 0.02,
+            radius: 0.03,
         },
         Scene {
             name: "bent normals",
@@ -343,7 +344,7 @@ pub fn surfaces() -> Vec<Scene> {
             ),
             max_depth: 5,
             ptracer: true,
-            radius: 0.015,
+            radius: 0.025,
         },
         Scene {
             name: "masks and panes",
@@ -405,7 +406,7 @@ pub fn cameras() -> Vec<Scene> {
             xml: corner(&pinhole(), &ball_of(&diffuse(0.7, 0.3, 0.2))),
             max_depth: 5,
             ptracer: true,
-            radius: 0.02,
+            radius: 0.03,
         },
         Scene {
             name: "moving glass ball and a lens",
