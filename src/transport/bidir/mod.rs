@@ -3,7 +3,8 @@
 //! One walk of light and one walk of the eye serve bidirectional path tracing (Veach 1997, chapter 10), light
 //! tracing, progressive photon mapping and their union, vertex connection and merging (Georgiev et al. 2012):
 //! they differ in the [`Techniques`] that are switched on. Light that comes straight from an emitter is never
-//! merged: connecting to the emitter finds it without bias.
+//! merged, and splatted by light tracing alone: connecting to the emitter finds it without bias and with less
+//! noise.
 
 mod eye;
 mod join;
@@ -29,8 +30,9 @@ pub enum Method {
     Ptracer,
     /// Vertex connection and merging.
     Vcm,
-    /// Stochastic progressive photon mapping: photons of light that was scattered are merged at every vertex
-    /// of the eye's walk; light straight from emitters is sampled as a path tracer does.
+    /// Stochastic progressive photon mapping: photons of light that was scattered are merged where the eye's
+    /// walk first scatters by other lobes than delta ones, and in scenes with glossy surfaces, at less
+    /// weight, behind that too. The rest is sampled as a path tracer does, each by its weight.
     Sppm,
 }
 
