@@ -8,6 +8,7 @@
 //! What other lobes than diffuse ones do to light is left out. The result is biased; it converges with the size
 //! of the patches for scenes of diffuse surfaces.
 
+pub mod form_factors;
 pub mod hierarchy;
 pub mod lights;
 pub mod mesh;
@@ -19,6 +20,7 @@ mod solvers;
 pub mod surfaces;
 pub mod triangulation;
 
+pub use form_factors::FormFactors;
 pub use hierarchy::Hierarchy;
 pub use mesh::{Located, Patch, PatchMesh};
 pub use piece::{Outline, Piece};
