@@ -8,6 +8,7 @@
 //! What other lobes than diffuse ones do to light is left out. The result is biased; it converges with the size
 //! of the patches for scenes of diffuse surfaces.
 
+pub mod display;
 pub mod hierarchy;
 pub mod mesh;
 pub mod optics;
@@ -15,6 +16,7 @@ pub mod piece;
 pub mod surfaces;
 pub mod triangulation;
 
+pub use display::Display;
 pub use hierarchy::Hierarchy;
 pub use mesh::{Located, Patch, PatchMesh};
 pub use piece::{Outline, Piece};
