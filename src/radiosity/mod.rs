@@ -12,6 +12,7 @@ pub mod hierarchy;
 pub mod mesh;
 pub mod optics;
 pub mod piece;
+pub mod polygon;
 pub mod surfaces;
 pub mod triangulation;
 
