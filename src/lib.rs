@@ -10,6 +10,7 @@ pub mod image_io;
 pub mod light;
 pub mod material;
 pub mod math;
+pub mod radiosity;
 pub mod render;
 pub mod sampler;
 pub mod scene;

@@ -4,12 +4,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Rooms from the ground up; rooms of one row are strangers to each other.
-const ROWS: [&[&str]; 9] = [
+const ROWS: [&[&str]; 10] = [
     &["math"],
     &["sampler", "image_io", "bsdf"],
     &["film", "geom", "texture"],
     &["material", "light"],
     &["scene"],
+    &["radiosity"],
     &["transport"],
     &["render"],
     &["format", "study"],
@@ -18,12 +19,22 @@ const ROWS: [&[&str]; 9] = [
 
 /// Crates that only the named rooms may use. Threads (rayon) are for what loops over pixels, shapes or
 /// triangles, not for what happens at one hit.
-const CRATES: [(&str, &[&str]); 13] = [
+const CRATES: [(&str, &[&str]); 15] = [
     ("obvhs", &["geom"]),
     (
         "rayon",
-        &["geom", "transport", "render", "study", "format", "cli"],
+        &[
+            "geom",
+            "radiosity",
+            "transport",
+            "render",
+            "study",
+            "format",
+            "cli",
+        ],
     ),
+    ("faer", &["radiosity"]),
+    ("spade", &["radiosity"]),
     ("kiddo", &["transport"]),
     ("serde_json", &["render", "cli"]),
     ("sobol_burley", &["sampler"]),

@@ -238,6 +238,12 @@ impl Sphere {
         self.at_normal(p.as_dvec3() - self.center)
     }
 
+    /// The point at these parameters.
+    pub(super) fn at_uv(&self, uv: DVec2) -> DVec3 {
+        let ((sin, cos), (r, z)) = ((uv.x * TAU).sin_cos(), (uv.y * PI).sin_cos());
+        self.to_world.point(DVec3::new(r * cos, r * sin, z))
+    }
+
     /// Uniform over the area.
     pub(super) fn sample_area(&self, u: Vec2) -> SurfaceSample {
         let z = 1.0 - 2.0 * u.x as f64;
@@ -309,6 +315,12 @@ impl Disk {
     pub(super) fn at_point(&self, p: Vec3) -> SurfacePoint {
         let l = self.to_world.inverse().point(p.as_dvec3());
         self.at_local(DVec2::new(l.x, l.y))
+    }
+
+    /// The point at these parameters.
+    pub(super) fn at_uv(&self, uv: DVec2) -> DVec3 {
+        let (sin, cos) = (uv.y * TAU).sin_cos();
+        self.to_world.point(DVec3::new(cos, sin, 0.0) * uv.x)
     }
 
     pub(super) fn sample_area(&self, u: Vec2) -> SurfaceSample {
@@ -401,6 +413,12 @@ impl Cylinder {
 
     pub(super) fn at_point(&self, p: Vec3) -> SurfacePoint {
         self.at_local(self.to_world.inverse().point(p.as_dvec3()))
+    }
+
+    /// The point at these parameters.
+    pub(super) fn at_uv(&self, uv: DVec2) -> DVec3 {
+        let (sin, cos) = (uv.x * TAU).sin_cos();
+        self.to_world.point(DVec3::new(cos, sin, uv.y))
     }
 
     pub(super) fn sample_area(&self, u: Vec2) -> SurfaceSample {

@@ -16,7 +16,7 @@ pub use mesh::{Mesh, MeshError};
 pub use sdf::{Sdf, SdfGrid};
 pub use world::{Deforming, GroupId, PlaceId, Placement, World};
 
-use crate::math::{Aabb, Frame, Vec2, Vec3, fp, warp};
+use crate::math::{Aabb, DVec2, DVec3, Frame, Vec2, Vec3, fp, warp};
 
 /// A half-line or segment. In the world `d` has unit length, so `t_max` is a distance; in the coordinates
 /// of a group of shapes it has any length, so that `t` remains that of the world.
@@ -84,6 +84,16 @@ pub struct Hit {
     pub bary: Vec2,
     /// The placement of the shape's group.
     pub place: PlaceId,
+}
+
+impl From<&Hit> for Endpoint {
+    fn from(hit: &Hit) -> Endpoint {
+        Endpoint {
+            p: hit.p,
+            p_err: hit.p_err,
+            ng: hit.ng,
+        }
+    }
 }
 
 impl Hit {
@@ -266,6 +276,16 @@ impl Geometry {
             Geometry::Sphere(s) => s.at_point(p).uv,
             Geometry::Disk(s) => s.at_point(p).uv,
             Geometry::Cylinder(s) => s.at_point(p).uv,
+        }
+    }
+
+    /// The point with texture coordinates `uv`, both in [0,1], of a shape that is no mesh; zero for one.
+    pub fn at_uv(&self, uv: DVec2) -> DVec3 {
+        match self {
+            Geometry::Mesh(_) | Geometry::Deforming(_) | Geometry::Sdf(_) => DVec3::ZERO,
+            Geometry::Sphere(s) => s.at_uv(uv),
+            Geometry::Disk(s) => s.at_uv(uv),
+            Geometry::Cylinder(s) => s.at_uv(uv),
         }
     }
 

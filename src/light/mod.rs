@@ -238,6 +238,12 @@ impl Lights {
         matches!(self.surfaces.get(shape.0 as usize), Some(Some(_)))
     }
 
+    /// Whether the surface of `shape` shines with a texture.
+    pub fn is_textured(&self, shape: ShapeId) -> bool {
+        let surface = self.surfaces.get(shape.0 as usize);
+        matches!(surface, Some(Some(s)) if matches!(s.radiance, Radiance::Textured(_)))
+    }
+
     /// Radiance that the surface sends from `hit` towards `hit.wo`.
     #[inline]
     pub fn le(&self, hit: &Hit) -> Rgb {

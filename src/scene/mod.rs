@@ -6,9 +6,10 @@ mod plan;
 pub use camera::{Camera, CameraSample};
 pub use plan::{Plan, PlanEntry};
 
-use crate::geom::{Geometry, Hit, Ray, ShapeId, World};
+use crate::geom::{Geometry, Hit, PlaceId, RawHit, Ray, ShapeId, World};
 use crate::light::{
-    Aim, Emission, EmissionNumbers, EmissionPdf, Emitter, EmitterSample, Lights, Source, Strategy,
+    Aim, Emission, EmissionNumbers, EmissionPdf, Emitter, EmitterId, EmitterSample, Lights, Source,
+    Strategy,
 };
 use crate::material::{self, Material, Shading};
 use crate::math::{DVec3, Rgb, Vec2, Vec3};
@@ -108,6 +109,27 @@ impl Scene {
     #[inline]
     pub fn occluded(&self, ray: &Ray) -> bool {
         self.world.occluded(ray)
+    }
+
+    /// All that shading needs at the meeting `raw` of `ray` with a shape at `place`, known to happen.
+    pub fn hit_at(&self, ray: &Ray, raw: &RawHit, place: PlaceId) -> Hit {
+        self.world.hit_at(ray, raw, place, self.tangents)
+    }
+
+    /// Whether the optical properties of a shape differ from place to place, or by chance.
+    pub fn varies(&self, shape: ShapeId) -> bool {
+        let material = self.surfaces.get(shape.0 as usize);
+        let material = material.and_then(|id| self.materials.get(id.0 as usize));
+        let shines = self.lights.is_textured(shape);
+        shines || material.is_some_and(|m| m.is_textured() || m.is_mixed())
+    }
+
+    /// The shape that emitter `id` is a surface of, shining equally in all directions; `None` for other lights.
+    pub fn lambertian_shape(&self, id: EmitterId) -> Option<ShapeId> {
+        match self.lights.emitters().get(id.0 as usize)? {
+            Emitter::Area { shape, .. } | Emitter::TexturedArea { shape, .. } => Some(*shape),
+            _ => None,
+        }
     }
 
     /// dp/du and dp/dv at a hit, for bump maps; either is zero where it is undefined.

@@ -1,9 +1,9 @@
 //! The camera walk: unidirectional path tracing with next-event estimation.
 
-use crate::bsdf::{Bsdf, Density, Mode};
+use crate::bsdf::{Bsdf, BsdfSample, Density, Mode};
 use crate::geom::{Hit, Ray};
 use crate::material::Shading;
-use crate::math::Rgb;
+use crate::math::{Rgb, Vec2};
 use crate::sampler::Sampler;
 use crate::scene::Scene;
 
@@ -147,6 +147,33 @@ pub(super) trait Gather {
     }
 
     fn at(&mut self, vertex: &Vertex, stats: &mut PathStats) -> Gathered;
+
+    /// Share of the samples of [`Gather::scatter`] at `vertex` that come from the BSDF, as far as directions to
+    /// emitters are concerned.
+    #[inline]
+    fn bsdf_share(&self, _vertex: &Vertex) -> f32 {
+        1.0
+    }
+
+    /// How the walk goes on from `vertex`; `None` where it ends.
+    #[inline]
+    fn scatter(
+        &mut self,
+        vertex: &Vertex,
+        u_lobe: f32,
+        u: Vec2,
+        _stats: &mut PathStats,
+    ) -> Option<Onward> {
+        let sample = vertex.shading.sample(u_lobe, u, Mode::Radiance)?;
+        Some(Onward { sample, met: None })
+    }
+}
+
+/// The next edge of a walk.
+pub(super) struct Onward {
+    pub sample: BsdfSample,
+    /// What it meets (`Some(None)`: nothing), where that was found out on the way.
+    pub met: Option<Option<Hit>>,
 }
 
 /// No other means than the walk itself.
@@ -214,10 +241,12 @@ impl PathSpec {
         // Whether a lobe other than a delta one has scattered the walk.
         let mut spread = start.departure.is_some_and(|d| d.density != Density::Delta);
         let mut last = start.departure;
+        let mut known = None;
         for depth in start.edges..max_depth {
-            let met = match straight {
-                true => first_seen(scene, ray, self.hide_emitters, stats),
-                false => scene.intersect(&ray),
+            let met = match known.take() {
+                Some(met) => met,
+                None if straight => first_seen(scene, ray, self.hide_emitters, stats),
+                None => scene.intersect(&ray),
             };
             let caustic = G::TAKES_CAUSTICS
                 && spread
@@ -258,14 +287,15 @@ impl PathSpec {
             let any_choice = roulette || scene.lights_are_chosen() || shading.bsdf.has_lobes();
             let u = numbers.draw(any_choice);
             let mut settled = false;
-            if !shading.bsdf.is_delta() && scene.has_lights() {
-                let vertex = Vertex {
-                    hit: &hit,
-                    shading: &shading,
-                    edges: depth + 1,
-                    sampler: &sampler,
-                    throughput,
-                };
+            let vertex = Vertex {
+                hit: &hit,
+                shading: &shading,
+                edges: depth + 1,
+                sampler: &sampler,
+                throughput,
+            };
+            let lit = !shading.bsdf.is_delta() && scene.has_lights();
+            if lit {
                 match gather.at(&vertex, stats) {
                     Gathered::Nothing => {}
                     Gathered::Also(found) => lo += throughput * found,
@@ -277,7 +307,7 @@ impl PathSpec {
                 if !settled && !gather.alone() {
                     let connect = Connect {
                         mis: Mis::Power {
-                            bsdf_per_light: 1.0,
+                            bsdf_per_light: gather.bsdf_share(&vertex),
                         },
                         passes: max_depth - depth - 2,
                     };
@@ -289,7 +319,13 @@ impl PathSpec {
             if depth + 2 >= max_depth && !scene.emitters_can_be_met() {
                 break;
             }
-            let Some(sample) = shading.sample(u.lobe, u.direction, Mode::Radiance) else {
+            let onward = match lit && !settled {
+                true => gather.scatter(&vertex, u.lobe, u.direction, stats),
+                false => shading
+                    .sample(u.lobe, u.direction, Mode::Radiance)
+                    .map(|sample| Onward { sample, met: None }),
+            };
+            let Some(Onward { sample, met }) = onward else {
                 break;
             };
             if sample.density != Density::Delta {
@@ -316,6 +352,7 @@ impl PathSpec {
                 break;
             }
             ray = hit.spawn(sample.wi);
+            known = met;
             stats.indirect += 1;
             last = Some(Departure {
                 from: hit,

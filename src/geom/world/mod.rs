@@ -208,11 +208,16 @@ impl World {
     #[inline(never)]
     fn intersect_stretches(&self, ray: &Ray, tangents: bool) -> Option<Hit> {
         let met = self.nearest(&self.top, ray, &())?;
-        let geometry = &self.geometries[met.raw.shape.0 as usize];
-        Some(match self.places.get(met.place.0 as usize) {
-            Some(place) => place.hit(geometry, ray, &met.raw, met.place, tangents),
-            None => geometry.hit(ray, &met.raw, tangents),
-        })
+        Some(self.hit_at(ray, &met.raw, met.place, tangents))
+    }
+
+    /// All that shading needs at the meeting `raw` of `ray` with a shape at `place`, known to happen.
+    pub fn hit_at(&self, ray: &Ray, raw: &RawHit, place: PlaceId, tangents: bool) -> Hit {
+        let geometry = &self.geometries[raw.shape.0 as usize];
+        match self.places.get(place.0 as usize) {
+            Some(placement) => placement.hit(geometry, ray, raw, place, tangents),
+            None => geometry.hit(ray, raw, tangents),
+        }
     }
 
     /// Whether anything stands in the way of `ray`.

@@ -1,0 +1,264 @@
+//! Radiosity: the diffuse light of a scene, the same from wherever it is seen.
+//!
+//! The surfaces are divided into patches of uniform radiosity B (exitance in W/m², per channel), which obey
+//! B_i = E_i + ρ_i (e_i + Σ_j F_ij B_j): E what the patch emits, ρ its diffuse reflectance, e the irradiance
+//! from lights that are no patches, and F_ij the form factor, the share of what leaves patch i (as a diffuse
+//! emitter) that arrives at patch j (Goral, Torrance, Greenberg & Battaile 1984). A patch shows radiance B/π.
+//!
+//! What other lobes than diffuse ones do to light is left out. The result is biased; it converges with the size
+//! of the patches for scenes of diffuse surfaces.
+
+pub mod hierarchy;
+pub mod mesh;
+pub mod optics;
+pub mod piece;
+pub mod surfaces;
+pub mod triangulation;
+
+pub use hierarchy::Hierarchy;
+pub use mesh::{Located, Patch, PatchMesh};
+pub use piece::{Outline, Piece};
+pub use surfaces::Surfaces;
+
+use crate::math::DVec3;
+use crate::scene::Scene;
+use std::fmt;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+/// A number per channel.
+pub type Rgb64 = DVec3;
+
+/// How form factors are found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FormFactorMethod {
+    /// All patches are drawn onto the half-cube over the middle of a patch (Cohen & Greenberg 1985), with
+    /// `resolution` pixels along its edge.
+    Hemicube { resolution: u32 },
+    /// `samples` pairs of points on both patches, and a ray between each.
+    MonteCarlo { samples: u32 },
+    /// The closed form of a polygon's irradiance at a point (Lambert 1760), at about `samples` points of the
+    /// receiver, times the share of rays that arrive.
+    Analytic { samples: u32 },
+}
+
+/// How the radiosities are solved for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Solver {
+    /// Gaussian elimination with partial pivoting.
+    Gauss,
+    /// Each patch gathers what the others have, in turn.
+    GaussSeidel,
+    /// All patches gather what the others had.
+    Jacobi,
+    /// The patch that has most to give sends it to all others (Cohen, Chen, Wallace & Greenberg 1988).
+    Shooting,
+    /// Links between patches as large as the error allows (Hanrahan, Salzman & Aupperle 1991), and clusters of
+    /// patches (Smits, Arvo & Greenberg 1994).
+    Hierarchical,
+}
+
+/// What is solved, and how well.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SolveSpec {
+    pub solver: Solver,
+    pub form_factors: FormFactorMethod,
+    /// Longest edge of a patch in scene units; `None`: a part of the size of the scene. The hierarchical solver
+    /// begins with whole facets and makes no patch with a longer edge than this in the end, nor a shorter one
+    /// than `min_size`.
+    pub patch_size: Option<f64>,
+    /// Shortest edge that the hierarchical solver makes; `None`: a part of the size of the scene.
+    pub min_size: Option<f64>,
+    /// Greatest error of a link of the hierarchical solver, as a share of the power that the scene emits.
+    pub error: f64,
+    /// The iteration ends when the residual, relative to the emitted power, is less.
+    pub residual: f64,
+    /// Most steps of an iterative solver: sweeps, or patches that shoot.
+    pub max_steps: Option<u64>,
+    /// Show light that is not shot yet as if it were spread everywhere (shooting only; display, not result).
+    pub ambient: bool,
+    /// Cut patches along the edges of shadows.
+    pub discontinuities: bool,
+    /// Curved shapes differ from their facets by at most this share of their radius.
+    pub curve_error: f64,
+    /// Most patches; more are an error before anything is solved.
+    pub max_patches: u64,
+    pub seed: u64,
+}
+
+impl Default for SolveSpec {
+    fn default() -> SolveSpec {
+        SolveSpec {
+            solver: Solver::Hierarchical,
+            form_factors: FormFactorMethod::Analytic { samples: 16 },
+            patch_size: None,
+            min_size: None,
+            error: 1e-5,
+            residual: 1e-4,
+            max_steps: None,
+            ambient: true,
+            discontinuities: false,
+            curve_error: 0.02,
+            max_patches: 4_000_000,
+            seed: 0,
+        }
+    }
+}
+
+/// How far a solver has come; handed to an observer after each step.
+pub struct Progress<'a> {
+    /// From 1.
+    pub step: u64,
+    pub mesh: &'a PatchMesh,
+    /// Per patch, in W/m², without the ambient term.
+    pub radiosity: &'a [Rgb64],
+    /// The ambient term: to be multiplied with a patch's reflectance and added for display; zero where a solver
+    /// has none.
+    pub ambient: Rgb64,
+    /// Relative to the emitted power.
+    pub residual: f64,
+}
+
+/// What a solution is known to be, and what it cost.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Report {
+    pub patches: usize,
+    pub links: usize,
+    pub steps: u64,
+    /// Whether the residual that was asked for was reached.
+    pub converged: bool,
+    /// Σ A |E + ρ e + ρ F B - B| over Σ A (E + ρ e), summed over the channels.
+    pub residual: f64,
+    /// W, per channel: emitted by patches and, in `external`, arriving from lights that are no patches.
+    pub emitted: Rgb64,
+    pub external: Rgb64,
+    /// Taken in by surfaces, and lost from the scene: together what was emitted, up to the residual.
+    pub absorbed: Rgb64,
+    pub escaped: Rgb64,
+    /// Share of the light that arrives at patches that they scatter in ways which radiosity leaves out.
+    pub other: f64,
+    /// Sentences for the user: what was left out and why.
+    pub warnings: Vec<String>,
+    pub mesh_seconds: f64,
+    pub form_factor_seconds: f64,
+    pub solve_seconds: f64,
+}
+
+/// The radiosity of a scene.
+#[derive(Debug)]
+pub struct Solution {
+    pub mesh: PatchMesh,
+    /// B per patch in W/m².
+    pub radiosity: Vec<Rgb64>,
+    /// All irradiance per patch in W/m²: B = E + ρ irradiance.
+    pub irradiance: Vec<Rgb64>,
+    /// Of it, what comes straight from emitters.
+    pub direct: Vec<Rgb64>,
+    /// What the hierarchical solver linked; `None` of other solvers.
+    pub hierarchy: Option<Hierarchy>,
+    pub report: Report,
+}
+
+impl Solution {
+    /// Irradiance of `patch` in W/m² that arrives after at least one diffuse reflection.
+    pub fn indirect(&self, patch: u32) -> Rgb64 {
+        let i = patch as usize;
+        (self.irradiance[i] - self.direct[i]).max(Rgb64::ZERO)
+    }
+}
+
+/// Why a scene has no solution.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SolveError {
+    /// Nothing reflects diffusely or shines.
+    NoPatches,
+    /// More patches than may be.
+    TooManyPatches { patches: u64, limit: u64 },
+    /// The matrix of a direct or gathering solver would not fit.
+    TooLarge {
+        solver: &'static str,
+        patches: u64,
+        bytes: u64,
+    },
+    /// A closed scene that absorbs nothing has no finite solution.
+    NoAbsorption,
+    /// The observer asked to stop.
+    Stopped,
+}
+
+impl fmt::Display for SolveError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            SolveError::NoPatches => {
+                f.write_str("no surface of the scene reflects diffusely or shines")
+            }
+            SolveError::TooManyPatches { patches, limit } => write!(
+                f,
+                "{patches} patches are more than the {limit} that are allowed: make patches larger"
+            ),
+            SolveError::TooLarge {
+                solver,
+                patches,
+                bytes,
+            } => write!(
+                f,
+                "the solver {solver} needs {} MiB for the form factors of {patches} patches: make patches \
+                 larger, or use the solver shooting or hierarchical",
+                bytes >> 20
+            ),
+            SolveError::NoAbsorption => f.write_str(
+                "the scene is closed and absorbs nothing: its radiosity grows without limit",
+            ),
+            SolveError::Stopped => f.write_str("stopped"),
+        }
+    }
+}
+
+impl std::error::Error for SolveError {}
+
+impl Solver {
+    pub const ALL: [Solver; 5] = [
+        Solver::Gauss,
+        Solver::GaussSeidel,
+        Solver::Jacobi,
+        Solver::Shooting,
+        Solver::Hierarchical,
+    ];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Solver::Gauss => "gauss",
+            Solver::GaussSeidel => "gauss-seidel",
+            Solver::Jacobi => "jacobi",
+            Solver::Shooting => "shooting",
+            Solver::Hierarchical => "hierarchical",
+        }
+    }
+}
+
+impl FormFactorMethod {
+    pub fn name(self) -> &'static str {
+        match self {
+            FormFactorMethod::Hemicube { .. } => "hemicube",
+            FormFactorMethod::MonteCarlo { .. } => "montecarlo",
+            FormFactorMethod::Analytic { .. } => "analytic",
+        }
+    }
+}
+
+/// The radiosity of `scene`. `observe` sees every step and may stop the work; what is done until then is the
+/// result.
+pub fn solve(
+    scene: &Scene,
+    spec: &SolveSpec,
+    observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<Solution, SolveError> {
+    let surfaces = Arc::new(Surfaces::new(scene, spec.curve_error));
+    if surfaces.facets().is_empty() {
+        return Err(SolveError::NoPatches);
+    }
+    match spec.solver {
+        Solver::Hierarchical => hierarchy::solve(scene, surfaces, spec, observe),
+        _ => Err(SolveError::NoPatches),
+    }
+}

@@ -1,0 +1,70 @@
+//! What radiosity needs to know of a surface: diffuse reflectance and exitance.
+
+use super::Rgb64;
+use super::piece::Outline;
+use crate::geom::Hit;
+use crate::math::{DVec2, Rgb};
+use crate::scene::Scene;
+use std::f64::consts::PI;
+
+/// Means over a piece of surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Optics {
+    /// Diffuse reflectance, in [0,1].
+    pub albedo: Rgb64,
+    /// Share of light from the normal's direction that is scattered in other ways: by mirrors, gloss, glass.
+    pub other: Rgb64,
+    /// Exitance of the emitter that the surface is, in W/m².
+    pub emission: Rgb64,
+}
+
+/// Optics at one place; `u` in [0,1) decides where a material is mixed.
+pub fn at(scene: &Scene, hit: &Hit, u: f32) -> Optics {
+    let shading = scene.shade(hit, u);
+    let seen = shading.normal().dot(hit.wo) > 0.0;
+    let albedo = match seen {
+        true => shading.bsdf.diffuse_albedo(),
+        false => Rgb::BLACK,
+    };
+    let all = shading.albedo();
+    Optics {
+        albedo: rgb64(albedo).clamp(Rgb64::ZERO, Rgb64::ONE),
+        other: rgb64(all - albedo).max(Rgb64::ZERO),
+        emission: rgb64(scene.le(hit)) * PI,
+    }
+}
+
+/// Whether a side of a surface reflects diffusely or shines, judged at a few points.
+pub fn takes_part(scene: &Scene, look: impl Fn(DVec2) -> Hit, outline: Outline) -> bool {
+    let mean = mean(scene, look, outline, 4);
+    mean.albedo + mean.emission != Rgb64::ZERO
+}
+
+/// The mean over a grid of about `points` points in the piece's outline, which `look` turns into hits.
+pub fn mean(scene: &Scene, look: impl Fn(DVec2) -> Hit, outline: Outline, points: u32) -> Optics {
+    let side = f64::from(points).sqrt().ceil().max(1.0) as u32;
+    let mut sum = Optics::default();
+    let n = side * side;
+    for i in 0..n {
+        let (x, y) = (i % side, i / side);
+        let u = (DVec2::new(f64::from(x), f64::from(y)) + 0.5) / f64::from(side);
+        let hit = look(outline.sample(u));
+        // Well spread also over the choices of mixed materials (van der Corput by the golden ratio).
+        let choice = (f64::from(i) * 0.618_033_988_749_895 + 0.5).fract();
+        let one = at(scene, &hit, choice as f32);
+        sum.albedo += one.albedo;
+        sum.other += one.other;
+        sum.emission += one.emission;
+    }
+    let share = 1.0 / f64::from(n);
+    Optics {
+        albedo: sum.albedo * share,
+        other: sum.other * share,
+        emission: sum.emission * share,
+    }
+}
+
+/// In f64.
+pub fn rgb64(c: Rgb) -> Rgb64 {
+    Rgb64::new(f64::from(c.r), f64::from(c.g), f64::from(c.b))
+}
