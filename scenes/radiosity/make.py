@@ -156,7 +156,7 @@ def columns():
 
 def vault():
     """A barrel of coffers; those along its crown are the skylights."""
-    mesh, lamps = Mesh(), Mesh()
+    mesh, panels, lamps = Mesh(), Mesh(), Mesh()
     rows = round(LENGTH / 1.2)
     for i in range(SIDES):
         a, b = (math.pi * (1 - k / SIDES) for k in (i, i + 1))
@@ -167,8 +167,9 @@ def vault():
             if i == SIDES // 2:
                 mesh.recess(at, u, v, [0.14] * 4, 0.3, lamps)
             else:
-                mesh.recess(at, u, v, [0.17] * 4, 0.16)
-    mesh.write("hall-vault.ply", "a barrel vault of coffers")
+                mesh.recess(at, u, v, [0.17] * 4, 0.16, panels)
+    mesh.write("hall-vault.ply", "a barrel vault of coffers, without their bottoms")
+    panels.write("hall-coffers.ply", "the bottoms of the coffers")
     lamps.write("hall-skylights.ply", "the skylights in the crown of the vault")
 
 
@@ -207,10 +208,10 @@ def side_room():
 
 def knot():
     """A trefoil knot, about 1.6 across, upright, its centre at the origin."""
-    mesh, along, around, r = Mesh(), 108, 12, 0.155
+    mesh, along, around, r = Mesh(), 108, 12, 0.125
     def curve(t):
-        w = 0.4 + 0.21 * math.cos(3 * t)
-        return (w * math.cos(2 * t) * 1.05, 0.3 * math.sin(3 * t), w * math.sin(2 * t) * 1.05)
+        w = 0.42 + 0.23 * math.cos(3 * t)
+        return (w * math.cos(2 * t) * 1.05, 0.27 * math.sin(3 * t), w * math.sin(2 * t) * 1.05)
     rings = []
     for i in range(along):
         t = TURN * i / along
