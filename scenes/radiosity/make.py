@@ -307,6 +307,110 @@ def paintings():
     png("marble-tiles.png", 96, 96, tiles)
 
 
+# The stair tower: 24 steps a turn about the z axis, between radius EYE and OUTER; after STEPS steps a landing.
+EYE, OUTER, RISE, AROUND, STEPS, LANDING, TOP = 1.35, 3.6, 0.17, 24, 72, 7, 16.0
+
+
+def level(i):
+    """Height of the tread of step i."""
+    return RISE * min(i + 1, STEPS)
+
+
+def angle(i):
+    return TURN * i / AROUND
+
+
+def stairs():
+    mesh = Mesh()
+    for i in range(STEPS + LANDING):
+        a, b, z = angle(i), angle(i + 1), level(i)
+        low = max(z - 0.24, 0.0)
+        i_a, o_a, o_b, i_b = (lambda z, r=r, c=c: polar(r, c, z) for r, c in [(EYE, a), (OUTER, a), (OUTER, b), (EYE, b)])
+        mesh.polygon(i_a(z), o_a(z), o_b(z), i_b(z))
+        mesh.polygon(i_b(low), i_a(low), i_a(z), i_b(z))
+        if low > 0:
+            mesh.polygon(i_a(low), i_b(low), o_b(low), o_a(low))
+        before = level(i - 1) if i else 0.0
+        if before < z:
+            mesh.polygon(i_a(before), o_a(before), o_a(z), i_a(z))
+        after = max(level(i + 1) - 0.24, 0.0) if i + 1 < STEPS + LANDING else z
+        if low < after:
+            mesh.polygon(o_b(low), i_b(low), i_b(after), o_b(after))
+    mesh.write("stairs-steps.ply", "the steps of a round stair")
+
+
+def bar(mesh, r, a, low, high, half=0.011):
+    """An upright square bar about (r, a), its sides towards the axis."""
+    across, along = polar(half, a, 0), polar(half, a + TURN / 4, 0)
+    p = lambda x, y, z: add(add(polar(r, a, z), across, x), along, y)
+    corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+    for c, d in zip(corners, corners[1:] + corners[:1]):
+        mesh.polygon(p(*c, low), p(*d, low), p(*d, high), p(*c, high))
+
+
+def railing():
+    """Two bars on each step, and a handrail; at the end of the landing it turns to the wall."""
+    mesh, r, rail = Mesh(), EYE + 0.07, Mesh()
+    height = lambda i: RISE * min(i + 1, STEPS) + 0.92
+    for i in range(STEPS + LANDING):
+        for f in (0.25, 0.75):
+            bar(mesh, r, angle(i + f), level(i), height(i - 0.5 + f) if i < STEPS else height(i))
+        p = lambda k, d, h: polar(r + d, angle(k), height(k - 0.5) + h)
+        ring = [(-0.03, 0), (0.03, 0), (0.03, 0.045), (-0.03, 0.045)]
+        for c, d in zip(ring, ring[1:] + ring[:1]):
+            # Counterclockwise as seen by who climbs; the end of a segment is turned to the right by that.
+            rail.polygon(p(i, *d), p(i, *c), p(i + 1, *c), p(i + 1, *d))
+    end, z = angle(STEPS + LANDING - 0.06), level(STEPS)
+    for k in range(1, 20):
+        bar(mesh, r + 0.11 * k, end, z, z + 0.92)
+    across, along = polar(1, end, 0), polar(0.03, end + TURN / 4, 0)
+    p = lambda x, y, h: add(add((0, 0, z + 0.92 + h), across, x), along, y)
+    for (y, h), (v, w) in [((-1, 0), (-1, 0.045)), ((-1, 0.045), (1, 0.045)), ((1, 0.045), (1, 0)), ((1, 0), (-1, 0))]:
+        rail.polygon(p(r, v, w), p(r, y, h), p(OUTER, y, h), p(OUTER, v, w))
+    mesh.write("stairs-bars.ply", "the bars of the railing")
+    rail.write("stairs-rail.ply", "the handrail")
+
+
+def tower():
+    """Walls in three parts: plaster, the painted band over the treads, and what shines in the windows."""
+    plaster, band, panes = Mesh(), Mesh(), Mesh()
+    turns = STEPS // AROUND
+    windows = {(3, 0), (12, 0), (20, 1), (7, 1), (16, 2), (1, 2)}
+    for k in range(AROUND):
+        a, b = angle(k), angle(k + 1)
+        # As seen from the axis, a is at the right.
+        def wall(mesh, low, high, window=False):
+            o, e = polar(OUTER, a, low), polar(OUTER, b, low)
+            u, v = minus(o, e), (0, 0, high - low)
+            if window:
+                mesh.recess(e, u, v, [0.2, 0.2, 0.35, high - low - 1.95], 0.35, panes)
+            else:
+                mesh.polygon(e, o, add(o, v), add(e, v))
+        wall(plaster, 0, level(k))
+        for turn in range(turns + 1):
+            i = k + AROUND * turn
+            on_stair = i < STEPS + LANDING
+            low = level(i) if on_stair else level(i - AROUND) + AROUND * RISE
+            high = TOP if turn == turns else level(i) + AROUND * RISE
+            if not on_stair:
+                wall(plaster, low, high)
+                continue
+            if i + AROUND >= STEPS + LANDING:
+                high = low + AROUND * RISE if turn < turns else TOP
+            elif turn == turns - 1:
+                high = level(i + AROUND)
+            wall(band, low, low + 1.05)
+            wall(plaster, low + 1.05, high, (k, turn) in windows)
+    # The ceiling and the drum of its skylight.
+    for k in range(AROUND):
+        a, b = angle(k), angle(k + 1)
+        plaster.polygon(polar(1.5, a, TOP), polar(1.5, b, TOP), polar(OUTER, b, TOP), polar(OUTER, a, TOP))
+        plaster.polygon(polar(1.5, b, TOP), polar(1.5, a, TOP), polar(1.5, a, TOP + 0.6), polar(1.5, b, TOP + 0.6))
+    plaster.write("stairs-walls.ply", "the plaster of the tower")
+    band.write("stairs-band.ply", "the painted band along the stair")
+    panes.write("stairs-windows.ply", "the windows of the tower")
+
+
 columns()
 vault()
 walls()
@@ -316,3 +420,6 @@ vase()
 case()
 frames()
 paintings()
+stairs()
+railing()
+tower()
