@@ -231,8 +231,8 @@ def knot():
 
 def vase():
     """A vase with a foot and a lip, 0.52 high, on the plane z = 0."""
-    outside = [(0, 0), (0.1, 0), (0.105, 0.012), (0.07, 0.035), (0.075, 0.06), (0.135, 0.15), (0.165, 0.25), (0.155, 0.33),
-               (0.1, 0.4), (0.062, 0.43), (0.06, 0.47), (0.095, 0.515), (0.1, 0.52)]
+    outside = [(0, 0), (0.1, 0), (0.105, 0.012), (0.07, 0.035), (0.075, 0.06), (0.135, 0.15), (0.165, 0.25),
+               (0.155, 0.33), (0.1, 0.4), (0.062, 0.43), (0.06, 0.47), (0.095, 0.515), (0.1, 0.52)]
     inside = [(0.088, 0.52), (0.05, 0.46), (0.05, 0.43), (0.09, 0.38), (0.14, 0.25), (0.06, 0.06), (0, 0.05)]
     mesh = Mesh()
     mesh.ring(outside + inside, 24)
@@ -266,7 +266,8 @@ def paintings():
         # Evening: bands of sky, a low sun and three rows of hills.
         if (x - 66) ** 2 + (y - 30) ** 2 < 90:
             return (250, 226, 150)
-        for base, high, phase, c in [(58, 5, 2.0, (44, 40, 66)), (50, 6, 0.5, (92, 62, 88)), (42, 7, 4.0, (150, 84, 88))]:
+        for base, high, phase, c in [(58, 5, 2.0, (44, 40, 66)), (50, 6, 0.5, (92, 62, 88)),
+                                     (42, 7, 4.0, (150, 84, 88))]:
             if y > base + high * math.sin(x / 14 + phase):
                 return c
         return [(120, 96, 140), (176, 112, 130), (222, 140, 108), (240, 174, 110), (246, 200, 124)][min(y // 9, 4)]
@@ -325,7 +326,8 @@ def stairs():
     for i in range(STEPS + LANDING):
         a, b, z = angle(i), angle(i + 1), level(i)
         low = max(z - 0.24, 0.0)
-        i_a, o_a, o_b, i_b = (lambda z, r=r, c=c: polar(r, c, z) for r, c in [(EYE, a), (OUTER, a), (OUTER, b), (EYE, b)])
+        corners = [(EYE, a), (OUTER, a), (OUTER, b), (EYE, b)]
+        i_a, o_a, o_b, i_b = (lambda z, r=r, c=c: polar(r, c, z) for r, c in corners)
         mesh.polygon(i_a(z), o_a(z), o_b(z), i_b(z))
         mesh.polygon(i_b(low), i_a(low), i_a(z), i_b(z))
         if low > 0:
