@@ -96,20 +96,18 @@ impl Room {
         FormFactors::new(&self.scene, &self.mesh, method, seed).matrix()
     }
 
-    /// From all patches on the outside of shape `from` to those of shape `to`.
-    pub fn between(&self, matrix: &Matrix, from: u32, to: u32) -> f64 {
-        let patches = |shape: u32| {
-            let facets = self.mesh.surfaces.facets();
-            let patches = self.mesh.patches.iter().enumerate();
-            patches.filter(move |(_, p)| {
-                let facet = &facets[p.facet as usize];
-                facet.shape.0 == shape && !facet.inside
-            })
-        };
-        let area: f64 = patches(from).map(|(_, p)| p.area).sum();
-        let mut sum = 0.0;
-        for (i, p) in patches(from) {
-            sum += p.area * patches(to).map(|(j, _)| matrix.row(i)[j]).sum::<f64>();
+    /// The form factor from all patches of the first shape to all others.
+    pub fn from_first(&self, method: FormFactorMethod, seed: u64) -> f64 {
+        let factors = FormFactors::new(&self.scene, &self.mesh, method, seed);
+        let facets = self.mesh.surfaces.facets();
+        let mut row = vec![0.0; self.mesh.len()];
+        let (mut sum, mut area) = (0.0, 0.0);
+        for (i, patch) in self.mesh.patches.iter().enumerate() {
+            if facets[patch.facet as usize].shape.0 == 0 {
+                factors.row(i as u32, &mut row);
+                sum += patch.area * row.iter().sum::<f64>();
+                area += patch.area;
+            }
         }
         sum / area
     }
