@@ -38,7 +38,7 @@ fn odd_patches_have_sound_form_factors() {
     check("nearly face to face", &(square(0.0) + &turned(1e-7)), 0.5);
     let beside = quad(V(1.0, 0.0, 0.0), V(1.0, 0.0, 0.0), V(0.0, 1.0, 1e-7));
     check("in one plane", &(square(0.0) + &beside), 0.5);
-    let needle = quad(V(0.0, 0.0, 0.0), V(1.0, 1e-6, 0.0), V(0.0, 0.0, 1e-6));
+    let needle = quad(V(0.0, 0.0, 0.0), V(1.0, 0.3, 0.0), V(1.0, 0.3, 1e-6));
     check(
         "a needle that stands",
         &(square(0.0) + &needle),
@@ -92,8 +92,8 @@ fn form_factors_have_no_unit() {
             let pairs = unit.f.iter().zip(&scaled.f);
             let off = pairs.map(|(a, b)| (a - b).abs()).sum::<f64>() / unit.n as f64;
             println!("{method:?} {scale:e}: {off:e}");
-            // Rays that pass edges within the rounding fall on either side of them.
-            assert!(off < 0.01, "{method:?} at {scale}: {off}");
+            // Which of two patches of equal area comes first may change, and with it the points between them.
+            assert!(off < 0.02, "{method:?} at {scale}: {off}");
         }
     }
 }

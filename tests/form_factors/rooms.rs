@@ -52,7 +52,7 @@ pub fn block(o: DVec3, [x, y, z]: [DVec3; 3]) -> String {
     .concat()
 }
 
-/// A unit box with two turned blocks in it: much like Cornell's.
+/// A unit box with two turned blocks that hover in it: all that is inside is seen, and nothing else.
 pub fn furnished() -> String {
     let turned = |degrees: f64, w: f64| {
         let (s, c) = degrees.to_radians().sin_cos();
@@ -64,8 +64,8 @@ pub fn furnished() -> String {
     let [a, b] = [turned(17.0, 0.3), turned(-16.0, 0.3)];
     [
         inside(DVec3::ZERO, DVec3::ONE),
-        block(DVec3::new(0.2, 0.5, 0.0), [a[0], a[1], DVec3::Z * 0.6]),
-        block(DVec3::new(0.52, 0.2, 0.0), [b[0], b[1], DVec3::Z * 0.3]),
+        block(DVec3::new(0.2, 0.5, 0.1), [a[0], a[1], DVec3::Z * 0.6]),
+        block(DVec3::new(0.52, 0.2, 0.1), [b[0], b[1], DVec3::Z * 0.3]),
     ]
     .concat()
 }
