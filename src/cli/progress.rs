@@ -77,6 +77,15 @@ fn done(film: &Film, stats: &Stats, stop: Stop) -> f64 {
 }
 
 fn message(film: &Film, stats: &Stats, stop: Stop) -> String {
+    if let Some(at) = &stats.solving {
+        return format!(
+            "solving radiosity: step {}, {} patches, residual {:.1e}, {}",
+            at.step,
+            at.patches,
+            at.residual,
+            human_seconds(stats.seconds)
+        );
+    }
     let left = stats.seconds * (1.0 / done(film, stats, stop).max(1e-6) - 1.0);
     let error = match film.estimate_error() {
         Some(e) => format!("error {:.2} %", percent(&e)[0]),

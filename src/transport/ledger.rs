@@ -4,6 +4,7 @@
 use std::time::Instant;
 
 use super::light_walk::LightVertex;
+use super::radiosity::Bias;
 use crate::film::Splat;
 use crate::math::Rgb;
 
@@ -75,6 +76,8 @@ pub struct Ledger {
     pub connections: PerTechnique<u64>,
     /// Light for wherever in the picture it arrives, in the order it was found.
     pub splats: Vec<Splat>,
+    /// What reading a cache of radiosity did to the picture.
+    pub bias: Bias,
     /// Seconds spent on sorting photons into maps, by the thread that waited for it.
     pub map_seconds: f64,
     /// Luminance that the sample under way owes to each technique.

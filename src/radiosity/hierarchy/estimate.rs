@@ -101,19 +101,22 @@ fn between_surfaces(
     }
     let ends: [Hit; 4] =
         std::array::from_fn(|i| at_sender(in_quarter(sp.outline, i, &mut numbers)));
-    let ends = ends.map(|hit| Endpoint::from(&hit));
-    let mut seen = [0.0; 4];
     let (mut arrived, mut sent) = (0.0, 0.0);
-    for (i, f) in factors.iter_mut().enumerate() {
-        if *f == 0.0 {
-            continue;
-        }
+    let mut seen = [None; 4];
+    for (i, seen) in seen.iter_mut().enumerate() {
         let hit = at_receiver(in_quarter(rp.outline, i, &mut numbers));
-        let free = (0..rays).filter(|j| !blocked(scene, &hit, &ends[(i + j) % 4]));
-        seen[i] = free.count() as f64 / rays as f64;
-        arrived += seen[i] * *f;
+        *seen = visibility(scene, &hit, &ends, i, rays);
+    }
+    // Where no pair of points faces each other, as elsewhere.
+    let known = seen.iter().flatten().count().max(1) as f64;
+    let elsewhere = match seen.iter().all(Option::is_none) {
+        true => 1.0,
+        false => seen.iter().flatten().sum::<f64>() / known,
+    };
+    for (f, seen) in factors.iter_mut().zip(seen) {
         sent += *f;
-        *f *= seen[i];
+        *f *= seen.unwrap_or(elsewhere);
+        arrived += *f;
     }
     let least = factors.iter().copied().fold(f64::INFINITY, f64::min);
     let most = factors.iter().copied().fold(0.0, f64::max);
@@ -122,6 +125,33 @@ fn between_surfaces(
         spread: most - least,
         visible: arrived / sent,
     }
+}
+
+/// Share of the light of `ends` that arrives at `hit`, by `rays` of them, from number `first` on; `None` where they
+/// do not face each other.
+fn visibility(scene: &Scene, hit: &Hit, ends: &[Hit; 4], first: usize, rays: usize) -> Option<f64> {
+    let (mut arrived, mut sent, mut traced) = (0.0, 0.0, 0);
+    for j in 0..4 {
+        let end = &ends[(first + j) % 4];
+        let d = (end.p - hit.p).as_dvec3();
+        let d2 = d.length_squared();
+        // The piece shows its front to where the hits look.
+        let facing = |n: &Hit, d: DVec3| d.dot(n.ng.as_dvec3()) * n.ng.dot(n.wo).signum() as f64;
+        let (ca, cb) = (facing(hit, d), facing(end, -d));
+        if !(ca > 0.0 && cb > 0.0 && d2 > 0.0) {
+            continue;
+        }
+        let weight = (ca / d2) * (cb / d2);
+        sent += weight;
+        if !blocked(scene, hit, &Endpoint::from(end)) {
+            arrived += weight;
+        }
+        traced += 1;
+        if traced == rays {
+            break;
+        }
+    }
+    (sent > 0.0).then(|| arrived / sent)
 }
 
 fn blocked(scene: &Scene, from: &Hit, to: &Endpoint) -> bool {
