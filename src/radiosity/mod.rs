@@ -9,6 +9,7 @@
 //! of the patches for scenes of diffuse surfaces.
 
 pub mod display;
+pub mod export;
 pub mod form_factors;
 pub mod hierarchy;
 pub mod lights;

@@ -70,6 +70,8 @@ pub struct CachedSpec {
 pub enum Display {
     /// Each patch by its own irradiance: the patches are seen.
     Flat,
+    /// By irradiance interpolated between vertices that patches share, so that smooth surfaces have no seams.
+    Gouraud,
     /// By what is sent to the point that is seen: light straight from emitters is sampled, and a ray for the rest
     /// reads the irradiance where it ends.
     #[default]
@@ -77,11 +79,12 @@ pub enum Display {
 }
 
 impl Display {
-    pub const ALL: [Display; 2] = [Display::Flat, Display::Gather];
+    pub const ALL: [Display; 3] = [Display::Flat, Display::Gouraud, Display::Gather];
 
     pub fn name(self) -> &'static str {
         match self {
             Display::Flat => "flat",
+            Display::Gouraud => "gouraud",
             Display::Gather => "gather",
         }
     }

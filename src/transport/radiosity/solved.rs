@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use crate::geom::Hit;
 use crate::math::Rgb;
+use crate::radiosity::display::Display;
 use crate::radiosity::{self, Progress, Report, Rgb64, Solution, SolveError, SolveSpec};
 use crate::scene::Scene;
 
@@ -25,6 +26,8 @@ pub struct Cache {
     /// Irradiance of each patch in W/m²: all of it, and what diffuse surfaces have reflected before.
     total: Vec<Rgb>,
     reflected: Vec<Rgb>,
+    /// Interpolates all irradiance, in W/m² at its vertices.
+    interpolation: Option<(Display, Vec<Rgb64>)>,
     /// Squared distance from a patch, in scene units, within which its irradiance is too coarse to be seen.
     near2: Vec<f32>,
 }
@@ -50,14 +53,34 @@ impl Cache {
             near2: (solution.mesh.patches.iter())
                 .map(|p| most.min(p.area as f32))
                 .collect(),
+            interpolation: None,
             solution,
+        }
+    }
+
+    /// With all irradiance interpolated between vertices instead of the same all over a patch.
+    fn interpolated(self, scene: &Scene) -> Cache {
+        let display = Display::new(scene, &self.solution.mesh);
+        let values = display.vertex_values(&self.solution.irradiance);
+        Cache {
+            interpolation: Some((display, values)),
+            ..self
         }
     }
 
     /// All irradiance at `hit`; `None` where the surface has no patch.
     #[inline]
     pub fn total(&self, hit: &Hit) -> Option<Read> {
-        self.read(hit, &self.total)
+        let Some((display, values)) = &self.interpolation else {
+            return self.read(hit, &self.total);
+        };
+        let mesh = &self.solution.mesh;
+        let located = mesh.locate(hit)?;
+        let value = display.at(mesh, values, located);
+        Some(Read {
+            irradiance: Rgb::from_array(value.to_array().map(|v| v.max(0.0) as f32)),
+            near2: self.near2[located.patch as usize],
+        })
     }
 
     /// The same without light straight from emitters.
@@ -85,6 +108,7 @@ pub struct Solving<'a> {
     scene: &'a Scene,
     spec: &'a SolveSpec,
     given: Option<&'a Solved>,
+    interpolated: bool,
     made: OnceLock<Result<Option<Cache>, SolveError>>,
 }
 
@@ -94,7 +118,16 @@ impl<'a> Solving<'a> {
             scene,
             spec,
             given,
+            interpolated: false,
             made: OnceLock::new(),
+        }
+    }
+
+    /// The same, read by interpolation between patches.
+    pub fn interpolated(self) -> Solving<'a> {
+        Solving {
+            interpolated: true,
+            ..self
         }
     }
 
@@ -124,7 +157,11 @@ impl<'a> Solving<'a> {
                 Err(error) => return Err(error),
             },
         };
-        Ok(Some(Cache::new(solution, self.scene)))
+        let cache = Cache::new(solution, self.scene);
+        Ok(Some(match self.interpolated {
+            true => cache.interpolated(self.scene),
+            false => cache,
+        }))
     }
 
     /// The solution, once [`Solving::prepare`] has made it; `None` where there is nothing to read.

@@ -32,7 +32,13 @@ pub struct View<'a> {
 impl<'a> View<'a> {
     pub fn new(spec: &'a RadiositySpec, setting: Setting<'a>) -> View<'a> {
         let scene = setting.scene;
-        let solving = || Solving::new(scene, &spec.solve, spec.given.as_ref());
+        let solving = || {
+            let solving = Solving::new(scene, &spec.solve, spec.given.as_ref());
+            match spec.show {
+                Display::Gouraud => solving.interpolated(),
+                _ => solving,
+            }
+        };
         View {
             spec,
             setting,
@@ -45,7 +51,7 @@ impl<'a> View<'a> {
     pub fn sample(&self, ray: Ray, sampler: &Sampler, ledger: &mut Ledger) -> Li {
         let cache = self.solving.as_ref().and_then(Solving::get);
         let reads = match self.spec.show {
-            Display::Flat => Reads::All,
+            Display::Flat | Display::Gouraud => Reads::All,
             Display::Gather => Reads::AllBehind,
         };
         let mut reader = Reader::<false>::new(self.setting.scene, &self.spec.path, cache, reads);
