@@ -10,7 +10,8 @@ use crate::cli::Failure;
 use crate::cli::render::scene_name;
 use crate::radiosity::{Patch, Progress, Report, Rgb64, Solution};
 use crate::render::{Job, Metadata, Stop};
-use crate::transport::radiosity::{Display, Solved};
+use crate::transport::radiosity as shown;
+use crate::transport::radiosity::Solved;
 use crate::transport::{IntegratorSpec, RadiositySpec};
 
 /// Renders what a solver has found by certain steps.
@@ -19,7 +20,7 @@ pub(super) struct Snapshots {
     steps: Vec<u64>,
     job: Job,
     stop: Stop,
-    show: Display,
+    show: shown::Show,
     metadata: Metadata,
     last: Option<u64>,
     spent: Duration,
@@ -43,8 +44,8 @@ impl Snapshots {
             job,
             stop: Stop::Spp(args.snapshot_spp),
             show: match args.show {
-                Show::Flat => Display::Flat,
-                Show::Gouraud => Display::Gouraud,
+                Show::Flat => shown::Show::Flat,
+                Show::Gouraud => shown::Show::Gouraud,
             },
             metadata: Metadata {
                 scene: scene_name(args.scene.as_deref()),

@@ -161,7 +161,7 @@ const SHOW: Param = Param::choice(
     "show",
     &["flat", "gouraud", "gather"],
     "gather",
-    "Patches as they are, interpolated between vertices, or a final gather: light sent to the point that is seen.",
+    "Patches as they are, interpolated, or a final gather: light sent to the point that is seen.",
 );
 const INTEGRATORS: &[Slot] = &[Slot::new(Category::Integrator, 0, usize::MAX)];
 
