@@ -136,7 +136,9 @@ a.xml:3:55: "solver" has no effect without radiosity
   help: leave it out, or set "indirect" to "gather""#,
     );
     says(
-        of("<integrator type='radiosity'><string name='solver' value='gauss'/><float name='error' value='1'/></integrator>"),
+        of(
+            "<integrator type='radiosity'><string name='solver' value='gauss'/><float name='error' value='1'/></integrator>",
+        ),
         r#"
 a.xml:3:93: "error" has no effect with the solver "gauss"
   <integrator type='radiosity'><string name='solver' value='gauss'/><float name='error' value='1'/></integrator>
