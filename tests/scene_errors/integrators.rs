@@ -156,7 +156,7 @@ a.xml:3:65: "resolution" has no effect with form factors by "analytic"
     says(
         of("<integrator type='radiosity'><string name='show' value='smooth'/></integrator>"),
         r#"
-a.xml:3:58: "show" must be one of "flat", "gather", not "smooth"
+a.xml:3:58: "show" must be one of "flat", "gouraud", "gather", not "smooth"
   <integrator type='radiosity'><string name='show' value='smooth'/></integrator>
                                                           ^"#,
     );

@@ -26,7 +26,7 @@ use super::mis::Techniques;
 use super::path::{Start, UNBOUNDED};
 use super::photons::{self, Kernel, KernelShape, PhotonMap, Shoot};
 use super::radiosity::{Cache, Reader, Reads, Solving};
-use super::{CacheSpec, Iteration, Ledger, Li, PathSpec, PhotonSpec, Setting, Technique};
+use super::{CacheSpec, Indirect, Iteration, Ledger, Li, PathSpec, PhotonSpec, Setting, Technique};
 use crate::geom::Ray;
 use crate::light::Aim;
 use crate::sampler::Sampler;
@@ -126,11 +126,14 @@ impl<'a> Combined<'a> {
             None => RADIUS_IN_PIXELS * photons::footprint(&setting),
         };
         let cache = &spec.cache;
-        let used = spec.show == Show::All && cache.is_used(setting.scene, &spec.path).is_ok();
+        let used = spec.show == Show::All
+            && cache.indirect == Indirect::Gather
+            && cache.is_used(setting.scene, &spec.path).is_ok();
         Combined {
             spec,
             setting,
-            solving: used.then(|| Solving::new(setting.scene, &cache.solve, cache.given.as_ref())),
+            solving: used
+                .then(|| Solving::new(setting.scene, &cache.solve, cache.given.as_ref(), true)),
             aim: setting.scene.aim_at_caustics(),
             count: spec.photons.count.unwrap_or(pixels),
             radius,
@@ -229,7 +232,7 @@ impl<'a> Combined<'a> {
         reader.caustics = iteration.caustics.as_ref();
         let start = Start::at_camera(ray);
         let li = path.walk(scene, start, sampler, &mut ledger.rays, &mut reader);
-        ledger.bias += reader.bias;
+        ledger.fresh_bias = reader.bias;
         ledger.record(Technique::Merging, reader.found);
         ledger.record(Technique::Path, li.radiance - reader.found);
         li

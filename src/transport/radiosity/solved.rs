@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use crate::geom::Hit;
 use crate::math::Rgb;
-use crate::radiosity::{self, Progress, Report, Rgb64, Solution, SolveError, SolveSpec};
+use crate::radiosity::{self, Display, Progress, Report, Rgb64, Solution, SolveError, SolveSpec};
 use crate::scene::Scene;
 
 /// A solution that is known already. Two are equal if they are the same one.
@@ -25,8 +25,17 @@ pub struct Cache {
     /// Irradiance of each patch in W/m²: all of it, and what diffuse surfaces have reflected before.
     total: Vec<Rgb>,
     reflected: Vec<Rgb>,
+    /// The same between vertices; `None` where patches are to be seen.
+    smooth: Option<Smooth>,
     /// Squared distance from a patch, in scene units, within which its irradiance is too coarse to be seen.
     near2: Vec<f32>,
+}
+
+/// Irradiance interpolated between the vertices of patches.
+struct Smooth {
+    display: Display,
+    total: Vec<Rgb64>,
+    reflected: Vec<Rgb64>,
 }
 
 /// What is read at a hit.
@@ -38,15 +47,24 @@ pub struct Read {
 }
 
 impl Cache {
-    pub fn new(solution: Arc<Solution>, scene: &Scene) -> Cache {
-        let rgb = |c: Rgb64| Rgb::from_array(c.to_array().map(|v| v.max(0.0) as f32));
+    /// `smooth`: interpolated between vertices.
+    pub fn new(solution: Arc<Solution>, scene: &Scene, smooth: bool) -> Cache {
         let diagonal = scene.world().bounds().diagonal().length();
         let most = (NEAR * diagonal).powi(2);
+        let patches = 0..solution.mesh.len() as u32;
+        let reflected: Vec<Rgb64> = patches.map(|i| solution.indirect(i)).collect();
+        let interpolated = || {
+            let display = Display::new(scene, &solution.mesh);
+            Smooth {
+                total: display.vertex_values(&solution.irradiance),
+                reflected: display.vertex_values(&reflected),
+                display,
+            }
+        };
         Cache {
+            smooth: smooth.then(interpolated),
             total: solution.irradiance.iter().map(|e| rgb(*e)).collect(),
-            reflected: (0..solution.mesh.len() as u32)
-                .map(|i| rgb(solution.indirect(i)))
-                .collect(),
+            reflected: reflected.iter().map(|e| rgb(*e)).collect(),
             near2: (solution.mesh.patches.iter())
                 .map(|p| most.min(p.area as f32))
                 .collect(),
@@ -57,23 +75,32 @@ impl Cache {
     /// All irradiance at `hit`; `None` where the surface has no patch.
     #[inline]
     pub fn total(&self, hit: &Hit) -> Option<Read> {
-        self.read(hit, &self.total)
+        self.read(hit, &self.total, |smooth| &smooth.total)
     }
 
     /// The same without light straight from emitters.
     #[inline]
     pub fn reflected(&self, hit: &Hit) -> Option<Read> {
-        self.read(hit, &self.reflected)
+        self.read(hit, &self.reflected, |smooth| &smooth.reflected)
     }
 
     #[inline]
-    fn read(&self, hit: &Hit, values: &[Rgb]) -> Option<Read> {
-        let patch = self.solution.mesh.locate(hit)?.patch as usize;
+    fn read(&self, hit: &Hit, flat: &[Rgb], smooth: fn(&Smooth) -> &[Rgb64]) -> Option<Read> {
+        let mesh = &self.solution.mesh;
+        let at = mesh.locate(hit)?;
+        let patch = at.patch as usize;
         Some(Read {
-            irradiance: values[patch],
+            irradiance: match &self.smooth {
+                Some(by) => rgb(by.display.at(mesh, smooth(by), at)),
+                None => flat[patch],
+            },
             near2: self.near2[patch],
         })
     }
+}
+
+fn rgb(c: Rgb64) -> Rgb {
+    Rgb::from_array(c.to_array().map(|v| v.max(0.0) as f32))
 }
 
 /// A patch is never too coarse from further away than this share of the scene's diagonal, however large it is: it is
@@ -85,12 +112,20 @@ pub struct Solving<'a> {
     scene: &'a Scene,
     spec: &'a SolveSpec,
     given: Option<&'a Solved>,
+    smooth: bool,
     made: OnceLock<Result<Option<Cache>, SolveError>>,
 }
 
 impl<'a> Solving<'a> {
-    pub fn new(scene: &'a Scene, spec: &'a SolveSpec, given: Option<&'a Solved>) -> Solving<'a> {
+    /// `smooth`: irradiance is to be interpolated within surfaces.
+    pub fn new(
+        scene: &'a Scene,
+        spec: &'a SolveSpec,
+        given: Option<&'a Solved>,
+        smooth: bool,
+    ) -> Solving<'a> {
         Solving {
+            smooth,
             scene,
             spec,
             given,
@@ -124,7 +159,7 @@ impl<'a> Solving<'a> {
                 Err(error) => return Err(error),
             },
         };
-        Ok(Some(Cache::new(solution, self.scene)))
+        Ok(Some(Cache::new(solution, self.scene, self.smooth)))
     }
 
     /// The solution, once [`Solving::prepare`] has made it; `None` where there is nothing to read.
