@@ -1,6 +1,6 @@
 //! Lines of discontinuity are where geometry says, and facets are divided along them without gap or overlap.
 
-#[allow(dead_code)]
+mod common;
 #[path = "common/render.rs"]
 mod render;
 
@@ -200,6 +200,181 @@ fn no_patch_reaches_under_a_block() {
         let jumps = triangles.edges.iter().flatten();
         assert!(jumps.filter(|e| **e == Some(Order::Value)).count() >= 8);
     }
+}
+
+/// Random lines over an outline: also through corners, along sides, twice, and almost twice.
+fn random_lines(rng: &mut common::Rng, outline: Outline, count: usize) -> Vec<Line> {
+    let corners = outline.corners();
+    let mut lines: Vec<Line> = Vec::new();
+    for i in 0..count {
+        let mut place = || {
+            let u = DVec2::new(f64::from(rng.f32()), f64::from(rng.f32()));
+            match (rng.f32() * 8.0) as u32 {
+                0 => corners[(u.x * 2.99) as usize],
+                1 => corners[0].lerp(corners[1], u.x),
+                2 => corners[1].lerp(corners[2], u.x),
+                _ => outline.sample(u),
+            }
+        };
+        let mut ends = [place(), place()];
+        if i % 5 == 4 {
+            let by = [0.0, 1e-12, 1e-7, 1e-4, 3e-3][(i / 5) % 5];
+            ends = lines[i - 2].ends.map(|st| outline.clamp(st + by));
+        }
+        let kind = [Kind::Contact, Kind::VertexEdge, Kind::EdgeVertex][i % 3];
+        lines.push(Line {
+            ends,
+            kind,
+            weight: 1.0,
+        });
+    }
+    lines
+}
+
+#[test]
+fn any_lines_on_any_facet_leave_no_gap_and_no_overlap() {
+    let mut rng = common::Rng::new(7);
+    let mut cut = 0;
+    for i in 0..240 {
+        let outline = [Outline::Triangle, Outline::Parallelogram][i % 2];
+        let scale = [1e-6, 1.0, 1e6][i % 3];
+        let thin = [1.0, 0.3, 1e-3, 1e-5][(i / 6) % 4];
+        let piece = Piece {
+            o: DVec3::new(3.0, -2.0, 1.0) * scale,
+            e1: DVec3::new(2.0, 0.3, 0.1) * scale,
+            e2: DVec3::new(-0.5, 1.1, 0.7) * scale * thin,
+            outline,
+        };
+        let lines = random_lines(&mut rng, outline, 2 + i / 6);
+        let size = [0.1, 0.5, f64::INFINITY][(i / 2) % 3] * scale;
+        let Some(triangles) = discontinuity::triangulate(&piece, size, &lines) else {
+            continue;
+        };
+        cut += 1;
+        let area: f64 = triangles
+            .triangles
+            .iter()
+            .map(|[a, b, c]| 0.5 * (*b - *a).perp_dot(*c - *a))
+            .sum();
+        let whole = Piece {
+            o: DVec3::ZERO,
+            e1: DVec3::X,
+            e2: DVec3::Y,
+            outline,
+        }
+        .area();
+        assert!((area / whole - 1.0).abs() < 1e-9, "{i}: {area}");
+        if i % 8 < 2 {
+            assert_found(&triangles, outline);
+        }
+    }
+    assert!(cut > 200, "{cut}");
+}
+
+#[test]
+fn extremes_of_geometry_are_cut_or_left_alone() {
+    for scale in [1e-6, 1.0, 1e6] {
+        let mut shapes = table();
+        let cube = |transform: &str| shape("cube", transform, "");
+        // Boxes that pass through each other and the floor, touch face to face, and lie in one plane.
+        shapes.push(cube("<scale value='0.3'/><translate x='1' z='0.2'/>"));
+        shapes.push(cube(
+            "<scale value='0.3'/><rotate z='1' angle='20'/><translate x='1.2' y='0.1' z='0.3'/>",
+        ));
+        shapes.push(cube("<scale value='0.2'/><translate x='-1' z='0.2'/>"));
+        shapes.push(cube(
+            "<scale value='0.2'/><translate x='-1' y='0.4' z='0.2'/>",
+        ));
+        shapes.push(shape(
+            "rectangle",
+            "<scale value='0.2'/><translate y='-1.5'/>",
+            "",
+        ));
+        // Needles: upright, and on the floor.
+        shapes.push(cube(
+            "<scale x='1e-5' y='1e-5' z='0.4'/><translate x='-1.5' y='-1' z='0.4'/>",
+        ));
+        shapes.push(shape(
+            "rectangle",
+            "<scale x='1' y='1e-5'/><translate y='1.7' z='1e-3'/>",
+            "",
+        ));
+        let (mesh, found) = meshed(&built(&shapes, scale), 0.4 * scale);
+        assert_sound(&mesh);
+        assert!(found.contacts >= 16, "{found:?}");
+        assert!(
+            mesh.patches
+                .iter()
+                .all(|p| p.area.is_finite() && p.area > 0.0)
+        );
+        if scale != 1.0 {
+            continue;
+        }
+        // The same however often it is made, and with any number of threads.
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(1)
+            .build()
+            .unwrap();
+        let again = pool.install(|| meshed(&built(&shapes, scale), 0.4 * scale));
+        assert_eq!(again.1, found);
+        let same = |a: &luxel::radiosity::Patch, b: &luxel::radiosity::Patch| a.piece == b.piece;
+        assert!(
+            mesh.patches
+                .iter()
+                .zip(&again.0.patches)
+                .all(|(a, b)| same(a, b))
+        );
+    }
+}
+
+#[test]
+fn lights_without_extent_throw_one_hard_line_per_edge() {
+    for light in [
+        "<emitter type='point'><point name='position' x='0' y='0' z='3'/></emitter>",
+        "<emitter type='directional'><vector name='direction' x='0.3' y='0' z='-1'/></emitter>",
+    ] {
+        let mut shapes = table();
+        shapes[2] = light.to_string();
+        let scene = built(&shapes, 1.0);
+        let surfaces = Surfaces::new(&scene, 0.02);
+        let (lines, found) = discontinuity::lines(&scene, &surfaces, 0.25, &Limits::default());
+        let floor = floor_of(&surfaces);
+        let piece = &surfaces.facets()[floor].piece;
+        assert_eq!(found.shadows, 4, "{found:?}");
+        for line in &lines[floor] {
+            assert_eq!(line.kind, Kind::Shadow);
+            for p in placed(piece, line) {
+                // The point light enlarges the table by 3/2, the sun shifts it by 0.3.
+                let size = if light.contains("point'>") { 0.75 } else { 0.5 };
+                let shift = if size == 0.5 { 0.3 } else { 0.0 };
+                let (x, y) = ((p.x - shift).abs(), p.y.abs());
+                assert!((x - size).abs() < 1e-5 && (y - size).abs() < 1e-5, "{p}");
+            }
+        }
+    }
+}
+
+#[test]
+fn large_scenes_meet_limits_and_say_so() {
+    let mut shapes = table();
+    shapes.push("<shape type='sphere'><point name='center' x='1' y='1' z='0.5'/><float name='radius' value='0.3'/>\
+                 <bsdf type='diffuse'/></shape>".to_string());
+    shapes.push(format!(
+        "<shape type='sphere'><point name='center' x='1' y='-1' z='2'/>\
+                 <float name='radius' value='0.1'/>{LAMP}</shape>"
+    ));
+    let scene = built(&shapes, 1.0);
+    let surfaces = Arc::new(Surfaces::new(&scene, 8e-5));
+    assert!(
+        surfaces.facets().len() > 100_000,
+        "{}",
+        surfaces.facets().len()
+    );
+    let (mesh, found) = discontinuity::mesh(&scene, surfaces, 0.25, &Limits::default());
+    assert!(mesh.len() > 100_000);
+    assert_eq!(found.left_out.curved, 1);
+    assert!(found.left_out.short_edges > 100_000, "{found:?}");
+    assert!(!found.warnings().is_empty());
 }
 
 /// Draws what `LUXEL_MESH` names to `LUXEL_MESH_OUT`: each cut facet as a picture, lines thick.

@@ -1,10 +1,10 @@
 //! Where surfaces touch or pass through a facet.
 
 use super::clip;
-use super::shell::{Polygon, Shell};
+use super::shell::Shell;
 use super::{Kind, Line};
-use crate::math::DVec3;
-use crate::radiosity::piece::Piece;
+use crate::math::{DVec2, DVec3};
+use crate::radiosity::piece::{Outline, Piece};
 use crate::radiosity::surfaces::Surfaces;
 
 /// The lines on a facet where other polygons touch it, or pass through; not those along its outline.
@@ -22,7 +22,7 @@ pub fn contacts(shell: &Shell, surfaces: &Surfaces, facet: usize) -> Vec<Line> {
         if i as u32 == own || other.low.cmpgt(high).any() || other.high.cmplt(low).any() {
             continue;
         }
-        touching(shell, piece, normal, other, |ends| {
+        touching(shell, (piece, normal), i as u32, |ends| {
             let placed = ends.map(|p| piece.locate(p));
             let Some(ends) = clip::to_outline(piece.outline, placed) else {
                 return;
@@ -40,16 +40,16 @@ pub fn contacts(shell: &Shell, surfaces: &Surfaces, facet: usize) -> Vec<Line> {
     lines
 }
 
-/// Calls `found` with each line that a polygon has in common with the plane of a piece.
+/// Calls `found` with each line that polygon `number` has in common with the plane of a piece.
 fn touching(
     shell: &Shell,
-    piece: &Piece,
-    normal: DVec3,
-    other: &Polygon,
+    (piece, normal): (&Piece, DVec3),
+    number: u32,
     mut found: impl FnMut([DVec3; 2]),
 ) {
     let mut crossings: Vec<DVec3> = Vec::new();
-    for (a, b) in other.sides() {
+    let other = &shell.polygons[number as usize];
+    for (side, (a, b)) in other.sides().enumerate() {
         let [p, q] = [a, b].map(|i| shell.points[i as usize]);
         let height = |p: DVec3| {
             let height = normal.dot(p - piece.o);
@@ -62,8 +62,10 @@ fn touching(
         };
         let (from, to) = (height(p), height(q));
         if from == 0.0 && to == 0.0 {
-            // Sides on the plane are lines themselves.
-            found([p, q]);
+            // Sides on the plane are lines themselves; several polygons may have the same.
+            if shell.edges[other.edges[side] as usize].first == number {
+                found([p, q]);
+            }
             continue;
         }
         if from == 0.0 {
@@ -78,7 +80,7 @@ fn touching(
 }
 
 /// Whether a line lies on a side of the outline, where nothing is to be cut.
-fn along_outline(shell: &Shell, piece: &Piece, ends: [crate::math::DVec2; 2]) -> bool {
+fn along_outline(shell: &Shell, piece: &Piece, ends: [DVec2; 2]) -> bool {
     let depths = ends.map(|st| clip::depths(piece.outline, st));
     // A unit of depth, in scene units: the height over each side.
     let area = piece.cross().length();
@@ -86,8 +88,8 @@ fn along_outline(shell: &Shell, piece: &Piece, ends: [crate::math::DVec2; 2]) ->
         area / piece.e2.length(),
         area / piece.e1.length(),
         area / match piece.outline {
-            crate::radiosity::Outline::Triangle => (piece.e2 - piece.e1).length(),
-            crate::radiosity::Outline::Parallelogram => piece.e2.length(),
+            Outline::Triangle => (piece.e2 - piece.e1).length(),
+            Outline::Parallelogram => piece.e2.length(),
         },
         area / piece.e1.length(),
     ];

@@ -54,8 +54,8 @@ impl From {
 /// A light and what can throw shadows in it.
 pub struct Thrower<'a> {
     source: &'a Source,
-    /// By corner of the light: edges that are outlines as seen from there.
-    outlines: Vec<Vec<u32>>,
+    /// Corners of the light, and the edges that are outlines as seen from there.
+    outlines: Vec<(usize, Vec<u32>)>,
     /// By edge of the light: corners on outlines.
     corners: Vec<Vec<u32>>,
 }
@@ -104,30 +104,37 @@ impl<'a> Thrower<'a> {
                 ends.iter().any(|end| before(shell.points[*end as usize]))
             })
             .collect();
-        let outlines: Vec<Vec<u32>> = source
-            .corners
-            .iter()
-            .map(|eye| {
-                let seen = useful.iter().copied();
-                seen.filter(|i| shell.edges[*i as usize].is_outline(&shell.points, eye))
-                    .collect()
-            })
-            .collect();
-        let corners = source
-            .edges
-            .iter()
-            .map(|ends| {
-                let mut corners: Vec<u32> = ends
-                    .iter()
-                    .flat_map(|end| &outlines[*end])
-                    .flat_map(|edge| shell.edges[*edge as usize].ends)
-                    .filter(|corner| before(shell.points[*corner as usize]))
-                    .collect();
-                corners.sort_unstable();
-                corners.dedup();
-                corners
-            })
-            .collect();
+        let is_outline = |corner: usize, edge: u32| {
+            shell.edges[edge as usize].is_outline(&shell.points, &source.corners[corner])
+        };
+        let mut outlines = vec![Vec::new(); source.corners.len()];
+        for &edge in &useful {
+            if source.smooth {
+                let [a, b] = shell.ends(edge);
+                let mut ends = source.outermost(a, b - a).to_vec();
+                ends.dedup();
+                let seen = ends.into_iter().filter(|corner| is_outline(*corner, edge));
+                seen.for_each(|corner| outlines[corner].push(edge));
+            } else {
+                let all = 0..source.corners.len();
+                let seen = all.filter(|corner| is_outline(*corner, edge));
+                seen.for_each(|corner| outlines[corner].push(edge));
+            }
+        }
+        let on_outlines = |ends: &[usize; 2]| {
+            let mut corners: Vec<u32> = ends
+                .iter()
+                .flat_map(|end| &outlines[*end])
+                .flat_map(|edge| shell.edges[*edge as usize].ends)
+                .filter(|corner| before(shell.points[*corner as usize]))
+                .collect();
+            corners.sort_unstable();
+            corners.dedup();
+            corners
+        };
+        let corners = source.edges.iter().map(on_outlines).collect();
+        let outlines = outlines.into_iter().enumerate();
+        let outlines = outlines.filter(|(_, edges)| !edges.is_empty()).collect();
         Thrower {
             source,
             outlines,
@@ -138,17 +145,13 @@ impl<'a> Thrower<'a> {
     /// Appends all lines on a facet that are longer than `least` scene units.
     pub fn events(&self, seeker: &Seeker, facet: usize, least: f64, out: &mut Vec<Event>) {
         let receiver = Receiver::new(seeker, facet, least);
-        for (corner, edges) in self.outlines.iter().enumerate() {
-            let eye = &self.source.corners[corner];
+        for (corner, edges) in &self.outlines {
+            let eye = &self.source.corners[*corner];
             let Some(view) = View::new(&receiver, eye) else {
                 continue;
             };
             for &edge in edges {
-                let [a, b] = shell_edge(seeker.shell, edge);
-                if self.source.smooth && !self.source.outermost(a, b - a).contains(&corner) {
-                    continue;
-                }
-                if let Some(ends) = self.thrown(&view, [a, b]) {
+                if let Some(ends) = self.thrown(&view, seeker.shell.ends(edge)) {
                     let kind = match self.source.edges.is_empty() && !self.source.smooth {
                         true => Kind::Shadow,
                         false => Kind::VertexEdge,
@@ -264,12 +267,6 @@ impl<'a> Thrower<'a> {
             lamp_normal: self.source.plane.map_or(DVec3::ZERO, |(_, n)| n),
         });
     }
-}
-
-fn shell_edge(shell: &Shell, edge: u32) -> [DVec3; 2] {
-    shell.edges[edge as usize]
-        .ends
-        .map(|i| shell.points[i as usize])
 }
 
 /// A facet that lines are thrown on.

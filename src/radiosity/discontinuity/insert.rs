@@ -118,13 +118,13 @@ impl Plane {
         (0..4).any(|i| a[i].abs().max(b[i].abs()) * heights[i] <= 1e-12)
     }
 
-    /// Shortest distance between points of a grid of this many cells.
+    /// Longest distance between neighbours of a grid of this many cells along an edge of the facet.
     fn spacing(&self, n: [u32; 2]) -> f64 {
         let (a, b) = (
             self.e1.length() / f64::from(n[0]),
             self.e2.length() / f64::from(n[1]),
         );
-        a.min(b)
+        a.max(b)
     }
 }
 

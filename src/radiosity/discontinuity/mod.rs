@@ -20,6 +20,7 @@ mod source;
 mod visible;
 
 pub use found::{Found, LeftOut};
+pub use insert::triangulate;
 
 use super::mesh::{self, Division, Grid, PatchMesh, cells_for};
 use super::piece::Piece;
@@ -198,6 +199,9 @@ pub fn lines(
     (lines, found)
 }
 
+/// Of the limit of lines, so many times as many are looked at: the others may be hidden.
+const TRIED: usize = 4;
+
 /// Lines of one facet, and how many were not taken.
 struct Sought {
     lines: Vec<Line>,
@@ -229,8 +233,8 @@ impl Seeker<'_> {
         }
         sort(&mut events, |event: &events::Event| event.line.weight);
         let (mut hidden, mut shown) = (0, 0);
-        for event in &events {
-            if shown >= self.limits.lines {
+        for (i, event) in events.iter().enumerate() {
+            if shown >= self.limits.lines || i >= TRIED * self.limits.lines {
                 beyond += 1;
                 continue;
             }
@@ -264,8 +268,8 @@ fn long_edges(shell: &Shell, size: f64, limits: &Limits, found: &mut Found) -> V
     });
     let least = limits.shortest * size.min(0.1 * reach.fold(0.0, f64::max));
     let length = |i: u32| {
-        let [a, b] = shell.edges[i as usize].ends;
-        shell.points[a as usize].distance(shell.points[b as usize])
+        let [a, b] = shell.ends(i);
+        a.distance(b)
     };
     let mut edges: Vec<u32> = (0..shell.edges.len() as u32)
         .filter(|i| shell.edges[*i as usize].can_be_outline())

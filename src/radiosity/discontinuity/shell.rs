@@ -13,6 +13,8 @@ pub struct Polygon {
     pub piece: Piece,
     /// Corners in order, as numbers of points; a triangle repeats its first.
     pub corners: [u32; 4],
+    /// Number of the edge from each corner to the next; of a triangle, three.
+    pub edges: [u32; 4],
     pub low: DVec3,
     pub high: DVec3,
 }
@@ -23,6 +25,8 @@ pub struct Edge {
     pub ends: [u32; 2],
     /// From the edge into each of its polygons: in their planes, of any length.
     pub inward: Vec<DVec3>,
+    /// The first of its polygons.
+    pub first: u32,
 }
 
 /// All polygons of a scene that stand still.
@@ -102,6 +106,7 @@ impl Shell {
             self.polygons.push(Polygon {
                 piece: *piece,
                 corners,
+                edges: [0; 4],
                 low,
                 high,
             });
@@ -109,12 +114,19 @@ impl Shell {
         found
     }
 
+    /// Both ends of an edge.
+    pub fn ends(&self, edge: u32) -> [DVec3; 2] {
+        self.edges[edge as usize]
+            .ends
+            .map(|i| self.points[i as usize])
+    }
+
     /// Finds which polygons meet at which edges.
     fn join(&mut self) {
         let mut known: HashMap<[u32; 2], usize> = HashMap::new();
-        for polygon in &self.polygons {
+        for (i, polygon) in self.polygons.iter_mut().enumerate() {
             let center = polygon.piece.center();
-            for (a, b) in polygon.sides() {
+            for (side, (a, b)) in polygon.sides().enumerate() {
                 let [p, q] = [a, b].map(|i| self.points[i as usize]);
                 // What is left of the way to the middle at right angles to the edge.
                 let along = (q - p).normalize_or_zero();
@@ -125,9 +137,11 @@ impl Shell {
                     self.edges.push(Edge {
                         ends,
                         inward: Vec::new(),
+                        first: i as u32,
                     });
                 }
                 self.edges[number].inward.push(inward);
+                polygon.edges[side] = number as u32;
             }
         }
     }
@@ -135,7 +149,7 @@ impl Shell {
 
 impl Polygon {
     /// Pairs of corners, in order.
-    pub fn sides(&self) -> impl Iterator<Item = (u32, u32)> {
+    pub fn sides(&self) -> impl Iterator<Item = (u32, u32)> + use<> {
         let corners = self.corners;
         let count = match self.piece.outline {
             Outline::Triangle => 3,

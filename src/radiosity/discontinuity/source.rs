@@ -17,6 +17,9 @@ pub struct Eye {
     pub w: f64,
 }
 
+/// Most corners that stand for a curved lamp.
+const MOST_CORNERS: usize = 2048;
+
 /// How bright a source is, for ranking.
 #[derive(Clone, Copy, Debug)]
 enum Strength {
@@ -233,6 +236,9 @@ fn cloud(
         .collect();
     corners.sort_unstable();
     corners.dedup();
+    // Enough to tell where a curve ends.
+    let step = corners.len().div_ceil(MOST_CORNERS).max(1);
+    let corners: Vec<u32> = corners.into_iter().step_by(step).collect();
     let points: Vec<DVec3> = corners.iter().map(|i| shell.points[*i as usize]).collect();
     let power: f64 = group
         .iter()

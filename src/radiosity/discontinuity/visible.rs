@@ -8,6 +8,8 @@ use crate::math::{DVec2, fp};
 
 /// Beside the line, rays are cast from this share of the patches' size away.
 const BESIDE: f64 = 2e-3;
+/// Along an edge of the lamp, this share of its length is as good as no distance.
+const ASIDE: f64 = 1e-3;
 /// Most places of a line that are looked at, before its ends are sought.
 const MOST: f64 = 32.0;
 /// Halvings of the interval that a visible part ends in.
@@ -79,10 +81,18 @@ impl<'a> Beside<'a> {
     fn changes(&self, t: f64) -> bool {
         let [a, b] = self.event.line.ends;
         let st = a.lerp(b, t);
-        let eye = self.event.from.eye(self.piece.at(st));
+        let differs =
+            |eye: &Eye| self.sees(st + self.across, eye) != self.sees(st - self.across, eye);
         match self.event.from {
             From::Horizon(_) => true,
-            _ => self.sees(st + self.across, &eye) != self.sees(st - self.across, &eye),
+            From::Eye(eye) => differs(&eye),
+            From::Edge { ends: [a, b], .. } => {
+                let eye = self.event.from.eye(self.piece.at(st));
+                // Where edges are parallel, the view grazes one from both sides: aside, it is clear.
+                let by = (b - a) * ASIDE;
+                let aside = [Eye::point(eye.v - by), Eye::point(eye.v + by)];
+                differs(&eye) || aside.iter().any(differs)
+            }
         }
     }
 
