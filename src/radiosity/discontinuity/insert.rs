@@ -318,13 +318,12 @@ impl Cutter {
         let mut edges = Vec::new();
         for face in self.mesh.inner_faces() {
             let numbers = face.vertices().map(|v| v.fix().index());
-            let [a, b, c] = numbers.map(|i| self.points[i]);
+            let placed = numbers.map(|i| places[i]);
             // Between points that rounding put beside the outline.
-            let longest = (b - a).length_squared().max((c - a).length_squared());
-            if (b - a).perp_dot(c - a) <= 1e-12 * longest {
+            if is_flat(numbers.map(|i| self.points[i])) || is_flat(placed) {
                 continue;
             }
-            triangles.push(numbers.map(|i| places[i]));
+            triangles.push(placed);
             corners.push(numbers.map(|i| i as u32));
             edges.push(face.adjacent_edges().map(|edge| {
                 let line = edge.is_constraint_edge();
@@ -347,6 +346,12 @@ impl Cutter {
             false => Order::Slope,
         }
     }
+}
+
+/// Whether a triangle has no area but for rounding.
+fn is_flat([a, b, c]: [DVec2; 3]) -> bool {
+    let longest = (b - a).length_squared().max((c - a).length_squared());
+    (b - a).perp_dot(c - a) <= 1e-12 * longest
 }
 
 /// Where on the first line the second crosses it, if both do so between their ends.
