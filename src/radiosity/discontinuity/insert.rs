@@ -32,15 +32,15 @@ pub fn triangulate(piece: &Piece, size: f64, lines: &[Line]) -> Option<Triangula
     let plane = Plane::new(piece)?;
     let mut cutter = Cutter::new(plane, snap(piece, size) / piece.longest_edge())?;
     let n = cells_for(piece, size);
-    let spacing = cutter.plane.spacing(n);
+    let spacing = (size / piece.longest_edge()).clamp(1e-4, 1.0);
     for line in lines {
         cutter.cut(line, spacing);
     }
     if cutter.pieces.is_empty() {
         return None;
     }
-    cutter.fill(n, spacing);
-    Some(cutter.triangles())
+    cutter.fill(n);
+    Some(cutter.triangles(spacing))
 }
 
 /// The plane of a facet in units of its longest edge, without distortion.
@@ -273,8 +273,8 @@ impl Cutter {
     }
 
     /// Adds the points of a regular grid, where nothing else is near.
-    fn fill(&mut self, n: [u32; 2], spacing: f64) {
-        let apart = APART * spacing;
+    fn fill(&mut self, n: [u32; 2]) {
+        let apart = APART * self.plane.spacing(n);
         let mut taken = Near::new(apart);
         let mut points = self.points.clone();
         for piece in &self.pieces {
@@ -303,7 +303,13 @@ impl Cutter {
         }
     }
 
-    fn triangles(&self) -> Triangulation {
+    fn triangles(&self, spacing: f64) -> Triangulation {
+        let mut jumps = Near::new(1.25 * spacing);
+        for (i, piece) in self.pieces.iter().enumerate() {
+            if piece.order == Order::Value {
+                jumps.add_box(piece.ends, i);
+            }
+        }
         let places: Vec<DVec2> = self
             .points
             .iter()
@@ -328,20 +334,20 @@ impl Cutter {
             edges.push(face.adjacent_edges().map(|edge| {
                 let line = edge.is_constraint_edge();
                 let ends = edge.positions().map(|p| DVec2::new(p.x, p.y));
-                line.then(|| self.order((ends[0] + ends[1]) * 0.5))
+                line.then(|| self.order((ends[0] + ends[1]) * 0.5, &jumps))
             }));
         }
         Triangulation::new(triangles, corners, edges, 0)
     }
 
     /// What happens at a point of a line: the most of what any line does there.
-    fn order(&self, p: DVec2) -> Order {
-        let jumps = |piece: &Stretch| {
-            let [a, b] = piece.ends;
+    fn order(&self, p: DVec2, jumps: &Near) -> Order {
+        let here = |i: &usize| {
+            let [a, b] = self.pieces[*i].ends;
             let t = (p - a).dot(b - a) / (b - a).length_squared();
-            piece.order == Order::Value && p.distance(a.lerp(b, t.clamp(0.0, 1.0))) <= EXACT
+            p.distance(a.lerp(b, t.clamp(0.0, 1.0))) <= EXACT
         };
-        match self.pieces.iter().any(jumps) {
+        match jumps.at(p).any(|i| here(&i)) {
             true => Order::Value,
             false => Order::Slope,
         }
@@ -385,6 +391,22 @@ impl Near {
     fn add(&mut self, p: DVec2, number: usize) {
         let key = self.key(p);
         self.cells.entry(key).or_default().push(number);
+    }
+
+    /// Adds a number to all cells that a line may pass within rounding.
+    fn add_box(&mut self, [a, b]: [DVec2; 2], number: usize) {
+        let (low, high) = (self.key(a.min(b) - EXACT), self.key(a.max(b) + EXACT));
+        for x in low[0]..=high[0] {
+            for y in low[1]..=high[1] {
+                self.cells.entry([x, y]).or_default().push(number);
+            }
+        }
+    }
+
+    /// Numbers in the cell of `p`.
+    fn at(&self, p: DVec2) -> impl Iterator<Item = usize> + '_ {
+        let there = self.cells.get(&self.key(p));
+        there.into_iter().flatten().copied()
     }
 
     /// The nearest of `points` within `reach`, which is at most that of the grid.
