@@ -11,6 +11,7 @@
 pub mod display;
 pub mod export;
 pub mod form_factors;
+pub mod discontinuity;
 pub mod hierarchy;
 pub mod lights;
 pub mod mesh;
