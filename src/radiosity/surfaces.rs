@@ -278,7 +278,9 @@ impl Surfaces {
     /// The facet seen from both of its sides, as far as these take part. `facet.piece` has its corners in the
     /// order of the shape; the numbers of what was made of it, outside first.
     fn add(&mut self, scene: &Scene, mut facet: Facet) -> [u32; 2] {
-        if facet.piece.area() <= 0.0 || !facet.piece.area().is_finite() {
+        // At the pole of a sphere, rounding leaves triangles an area whose normal means nothing.
+        let rounding = 1e-12 * facet.piece.longest_edge().powi(2);
+        if facet.piece.area() <= rounding || !facet.piece.area().is_finite() {
             self.left_out.degenerate += 1;
             return [NONE; 2];
         }
