@@ -79,7 +79,8 @@ pub struct SolveSpec {
     pub patch_size: Option<f64>,
     /// Shortest edge that the hierarchical solver makes; `None`: a part of the size of the scene.
     pub min_size: Option<f64>,
-    /// Greatest error of a link of the hierarchical solver, as a share of the power that the scene emits.
+    /// Greatest error of a link of the hierarchical solver: the error of its receiver's irradiance as a share of
+    /// the irradiance that is usual there, times the receiver's share of the area of all surfaces.
     pub error: f64,
     /// The iteration ends when the residual, relative to the emitted power, is less.
     pub residual: f64,

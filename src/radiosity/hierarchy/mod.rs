@@ -69,12 +69,12 @@ pub fn solve(
     observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Solution, SolveError> {
     let start = Instant::now();
-    let mut tree = Tree::new(scene, surfaces, spec)?;
+    let mut tree = Tree::new(scene, surfaces.clone(), spec)?;
     let mut report = Report {
         mesh_seconds: start.elapsed().as_secs_f64(),
         ..Report::default()
     };
-    let mut refiner = Refiner::new(scene, spec, &tree);
+    let mut refiner = Refiner::new(scene, &surfaces, spec, &mut tree);
     let emitted = tree.emitted_power();
     let mut field = Field::new(&tree);
     let most = spec.max_steps.unwrap_or(MAX_STEPS);
@@ -82,7 +82,7 @@ pub fn solve(
     for looser in (0..=LOOSER).rev() {
         let clock = Instant::now();
         let error = spec.error * STEP.powi(looser);
-        refiner.refine(&mut tree, &mut field, error * emitted.max_element());
+        refiner.refine(&mut tree, &mut field, error);
         report.form_factor_seconds += clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         // Before the last refinement, it is enough to see where light goes.
