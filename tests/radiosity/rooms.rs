@@ -15,7 +15,9 @@ pub const FLAT: [Solver; 4] = [
 ];
 
 pub fn scene(body: &str) -> Scene {
-    let xml = format!("<scene version='3.0.0'><sensor type='perspective'><float name='shutter_close' value='1'/></sensor>{body}</scene>");
+    let xml = format!(
+        "<scene version='3.0.0'><sensor type='perspective'><float name='shutter_close' value='1'/></sensor>{body}</scene>"
+    );
     render::compile(&xml).job.scene
 }
 
