@@ -8,7 +8,9 @@ use luxel::math::{DVec2, DVec3};
 use luxel::radiosity::discontinuity::{self, Found, Kind, Limits, Line};
 use luxel::radiosity::mesh::Division;
 use luxel::radiosity::triangulation::{Order, Triangulation};
-use luxel::radiosity::{Outline, PatchMesh, Piece, Surfaces};
+use luxel::radiosity::{
+    FormFactorMethod, Outline, PatchMesh, Piece, Progress, SolveSpec, Solver, Surfaces,
+};
 use luxel::scene::Scene;
 use std::sync::Arc;
 
@@ -94,11 +96,11 @@ fn assert_found(triangles: &Triangulation, outline: Outline) {
         // The additive recurrence of the plastic number: spread evenly.
         let u = DVec2::new(0.754_877_666, 0.569_840_291) * f64::from(i);
         let st = outline.sample(DVec2::new(u.x.fract(), u.y.fract()));
-        let found = triangles.locate(st);
-        let corners = triangles.triangles[(found.patch - triangles.first) as usize];
+        let (index, inside) = triangles.locate(st);
+        let corners = triangles.triangles[index as usize];
         let back = corners[0]
-            + (corners[1] - corners[0]) * found.st.x
-            + (corners[2] - corners[0]) * found.st.y;
+            + (corners[1] - corners[0]) * inside.x
+            + (corners[2] - corners[0]) * inside.y;
         assert!(back.distance(st) < 1e-9, "{st} {back}");
     }
 }
@@ -107,8 +109,8 @@ fn assert_found(triangles: &Triangulation, outline: Outline) {
 fn assert_not_straddled(triangles: &Triangulation, line: &Line, tolerance: f64) {
     for t in 1..64 {
         let st = line.ends[0].lerp(line.ends[1], f64::from(t) / 64.0);
-        let found = triangles.locate(st);
-        let [a, b, c] = triangles.triangles[(found.patch - triangles.first) as usize];
+        let (index, _) = triangles.locate(st);
+        let [a, b, c] = triangles.triangles[index as usize];
         let near = [(a, b), (b, c), (c, a)].iter().any(|(p, q)| {
             let d = *q - *p;
             let along = (st - *p).dot(d) / d.length_squared();
@@ -375,6 +377,52 @@ fn large_scenes_meet_limits_and_say_so() {
     assert_eq!(found.left_out.curved, 1);
     assert!(found.left_out.short_edges > 100_000, "{found:?}");
     assert!(!found.warnings().is_empty());
+}
+
+/// Radiosity of the floor and the table, with the hierarchical solver and with shooting: lines lower the error where
+/// the same number of patches without them blurs the shadow.
+#[test]
+fn every_solver_follows_lines() {
+    let scene = built(&table(), 1.0);
+    for solver in [Solver::Hierarchical, Solver::Shooting, Solver::GaussSeidel] {
+        let spec = SolveSpec {
+            solver,
+            form_factors: FormFactorMethod::Analytic { samples: 4 },
+            patch_size: Some(0.5),
+            min_size: Some(0.25),
+            discontinuities: true,
+            ..SolveSpec::default()
+        };
+        let go = |_: &Progress| std::ops::ControlFlow::Continue(());
+        let solution = luxel::radiosity::solve(&scene, &spec, &mut { go }).unwrap();
+        let floor = floor_of(&solution.mesh.surfaces);
+        assert!(matches!(
+            solution.mesh.divisions[floor],
+            Division::Triangles(_)
+        ));
+        let facet = &solution.mesh.surfaces.facets()[floor].piece;
+        let (mut area, mut dark) = (0.0, 0.0);
+        for (i, patch) in solution.mesh.patches.iter().enumerate() {
+            if patch.facet as usize != floor {
+                continue;
+            }
+            area += patch.area;
+            let middle = patch.piece.center();
+            let hit = solution
+                .mesh
+                .surfaces
+                .hit(&scene, floor as u32, facet.locate(middle));
+            assert_eq!(solution.mesh.locate(&hit).unwrap().patch as usize, i);
+            // Within 0.65 of the middle, the table hides all of the lamp.
+            if solution.direct[i] == DVec3::ZERO {
+                assert!(middle.abs().max_element() < 0.65, "{middle}");
+                dark += patch.area;
+            }
+        }
+        assert!((area / facet.area() - 1.0).abs() < 1e-9, "{area}");
+        // Exactly that square is dark: patches end there.
+        assert!((dark / 1.69 - 1.0).abs() < 0.02, "{solver:?} {dark}");
+    }
 }
 
 /// Draws what `LUXEL_MESH` names to `LUXEL_MESH_OUT`: each cut facet as a picture, lines thick.

@@ -208,6 +208,36 @@ impl Bsdf {
         matches!(self, Bsdf::Diffuse(_))
     }
 
+    /// Whether all lobes but delta ones are diffuse, and there is one: irradiance is all there is to know of the
+    /// light that these scatter.
+    #[inline]
+    pub fn is_matte(&self) -> bool {
+        matches!(self, Bsdf::Diffuse(_) | Bsdf::Plastic(_))
+    }
+
+    /// Share of light that arrives equally from all directions which the diffuse lobe sends towards `wo`, as
+    /// radiance over radiance; 0 where there is none that can be told from other lobes.
+    #[inline]
+    pub fn diffuse_towards(&self, wo: Vec3) -> Rgb {
+        match self {
+            Bsdf::Diffuse(b) if wo.z > 0.0 => b.albedo,
+            Bsdf::Plastic(b) if wo.z > 0.0 => b.diffuse_towards(wo),
+            Bsdf::RoughPlastic(b) if wo.z > 0.0 => b.diffuse_towards(wo),
+            _ => Rgb::BLACK,
+        }
+    }
+
+    /// What is left without that lobe; `None` if that is nothing.
+    #[inline]
+    pub fn without_diffuse(&self) -> Option<Bsdf> {
+        match self {
+            Bsdf::Diffuse(_) => None,
+            Bsdf::Plastic(b) => b.without_diffuse().map(Bsdf::Plastic),
+            Bsdf::RoughPlastic(b) => b.without_diffuse().map(Bsdf::RoughPlastic),
+            other => Some(*other),
+        }
+    }
+
     /// Reflectance of the diffuse lobe for light that arrives equally from all directions, 0 without one.
     #[inline]
     pub fn diffuse_albedo(&self) -> Rgb {

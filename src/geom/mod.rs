@@ -109,16 +109,7 @@ impl Hit {
     /// The segment from here to `q`, free of both surfaces it connects.
     #[inline]
     pub fn spawn_to(&self, q: &Endpoint) -> Ray {
-        let o = fp::offset_origin(self.p, self.p_err, self.ng, q.p - self.p);
-        let to = q.offset_towards(o);
-        let d = to - o;
-        let len = d.length();
-        Ray {
-            o,
-            d: d / len,
-            t_max: fp::connection_t_max(len),
-            time: self.time,
-        }
+        Endpoint::from(self).segment_to(q, self.time)
     }
 }
 
@@ -132,6 +123,22 @@ pub struct Endpoint {
 }
 
 impl Endpoint {
+    /// The segment from here to `q` at `time`, free of both surfaces it connects. Its direction is NaN where both
+    /// points are the same.
+    #[inline]
+    pub fn segment_to(&self, q: &Endpoint, time: f32) -> Ray {
+        let o = fp::offset_origin(self.p, self.p_err, self.ng, q.p - self.p);
+        let to = q.offset_towards(o);
+        let d = to - o;
+        let len = d.length();
+        Ray {
+            o,
+            d: d / len,
+            t_max: fp::connection_t_max(len),
+            time,
+        }
+    }
+
     /// The point, moved towards `o` so far that a ray from there does not meet the surface of the point.
     #[inline]
     pub fn offset_towards(&self, o: Vec3) -> Vec3 {

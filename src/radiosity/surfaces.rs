@@ -50,6 +50,20 @@ pub struct LeftOut {
     pub formless: u32,
     /// Triangles without area.
     pub degenerate: u32,
+    /// Area that neither reflects diffusely nor shines, from no side; and that of everything which was looked
+    /// at. In squared scene units.
+    pub idle_area: f64,
+    pub area: f64,
+}
+
+impl LeftOut {
+    /// Share of the area that neither reflects diffusely nor shines.
+    pub fn share(&self) -> f64 {
+        match self.area > 0.0 {
+            true => self.idle_area / self.area,
+            false => 0.0,
+        }
+    }
 }
 
 /// All facets, and how to find that of a hit.
@@ -286,6 +300,11 @@ impl Surfaces {
                 *number = self.facets.len() as u32;
                 self.facets.push(facet);
             }
+        }
+        let area = facet.piece.area();
+        self.left_out.area += area;
+        if sides == [NONE; 2] {
+            self.left_out.idle_area += area;
         }
         sides
     }

@@ -303,6 +303,44 @@ impl Scene {
         }
     }
 
+    /// Whether some surface has a diffuse lobe.
+    pub fn is_diffuse(&self) -> bool {
+        self.diffuse_shapes().next().is_some()
+    }
+
+    fn diffuse_shapes(&self) -> impl Iterator<Item = ShapeId> + '_ {
+        let shapes = (0..self.surfaces.len() as u32).map(ShapeId);
+        shapes.filter(|shape| {
+            let material = self.surfaces[shape.0 as usize];
+            let material = self.materials.get(material.0 as usize);
+            material.is_some_and(Material::is_diffuse)
+        })
+    }
+
+    /// Whether there can be diffuse surfaces that see each other, and light on them; if not, why.
+    pub fn exchanges_diffuse_light(&self) -> Result<(), &'static str> {
+        if !self.has_lights() {
+            return Err("there is no emitter");
+        }
+        let mut shapes = self.diffuse_shapes();
+        let (Some(first), second) = (shapes.next(), shapes.next()) else {
+            return Err("no surface reflects diffusely");
+        };
+        // A flat surface does not see itself, nor does a ball from outside; one that is not flat, or stands in
+        // several places, may.
+        let alone = second.is_none() && self.world.placement_of(first).is_none();
+        let geometry = &self.world.geometries()[first.0 as usize];
+        let single = match geometry {
+            Geometry::Mesh(mesh) => mesh.indices().len() == 1,
+            Geometry::Disk(_) => true,
+            _ => false,
+        };
+        match alone && single {
+            true => Err("a single flat surface reflects diffusely, which does not light itself"),
+            false => Ok(()),
+        }
+    }
+
     /// Whether some surface scatters light about single directions, as rough metal and glass do.
     pub fn is_glossy(&self) -> bool {
         let used = |id: &MaterialId| self.materials.get(id.0 as usize);
