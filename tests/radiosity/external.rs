@@ -21,7 +21,7 @@ fn mean_irradiance(solution: &Solution) -> Rgb64 {
 #[test]
 fn a_point_lights_each_patch_by_distance_and_angle() {
     let light = "<emitter type='point'><point name='position' x='0.2' y='-0.1' z='0.5'/>\
-                 <spectrum name='intensity' value='3'/></emitter>";
+                 <rgb name='intensity' value='3'/></emitter>";
     let solution = plate(0.5, light);
     for (patch, e) in solution.mesh.patches.iter().zip(&solution.irradiance) {
         // The mean over the patch, by the midpoint rule.
@@ -43,8 +43,8 @@ fn a_point_lights_each_patch_by_distance_and_angle() {
 #[test]
 fn far_lights_have_their_irradiance() {
     let sun = "<emitter type='directional'><vector name='direction' x='3' y='0' z='-4'/>\
-               <spectrum name='irradiance' value='5'/></emitter>";
-    let sky = "<emitter type='constant'><spectrum name='radiance' value='0.7'/></emitter>";
+               <rgb name='irradiance' value='5'/></emitter>";
+    let sky = "<emitter type='constant'><rgb name='radiance' value='0.7'/></emitter>";
     for (light, expected, within) in [(sun, 4.0, 1e-5), (sky, 0.7 * PI, 3e-3)] {
         let found = mean_irradiance(&plate(0.5, light)).x;
         assert!(
@@ -60,7 +60,7 @@ fn far_lights_have_their_irradiance() {
 fn a_spot_and_a_shadow() {
     let spot = "<emitter type='spot'><transform name='to_world'>\
                 <lookat origin='0, 0, 2' target='0, 0, 0' up='0, 1, 0'/></transform>\
-                <spectrum name='intensity' value='2'/><float name='cutoff_angle' value='5'/>\
+                <rgb name='intensity' value='2'/><float name='cutoff_angle' value='5'/>\
                 <float name='beam_width' value='4.9'/></emitter>";
     let solution = plate(0.5, spot);
     // The cone has a radius of 0.17: no light in the corners, I/d² in the middle.

@@ -15,7 +15,9 @@ pub const FLAT: [Solver; 4] = [
 ];
 
 pub fn scene(body: &str) -> Scene {
-    let xml = format!("<scene version='3.0.0'><sensor type='perspective'/>{body}</scene>");
+    let xml = format!(
+        "<scene version='3.0.0'><sensor type='perspective'><float name='shutter_close' value='1'/></sensor>{body}</scene>"
+    );
     render::compile(&xml).job.scene
 }
 
@@ -30,7 +32,7 @@ pub fn colored([r, g, b]: &[f64; 3]) -> String {
 /// An emitter with this exitance in W/m².
 pub fn shining(exitance: f64) -> String {
     let radiance = exitance / PI;
-    format!("<emitter type='area'><spectrum name='radiance' value='{radiance}'/></emitter>")
+    format!("<emitter type='area'><rgb name='radiance' value='{radiance}'/></emitter>")
 }
 
 /// A shape of a type with transforms and children.

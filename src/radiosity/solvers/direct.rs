@@ -14,7 +14,7 @@ const PARTS: usize = 8;
 
 /// More radiosity than this over what was emitted says no more than that (almost) nothing is absorbed: form
 /// factors are not known that well.
-const MOST_GAIN: f64 = 1e9;
+const MOST_GAIN: f64 = 1e6;
 
 /// Solves with partial pivoting; the residual is that of the rounding.
 pub(super) fn eliminate(system: &System, f: &Matrix, run: Run) -> Result<Solved, SolveError> {

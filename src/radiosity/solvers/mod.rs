@@ -30,7 +30,7 @@ const PATCHES_OF_MATRIX: u64 = 2_000;
 const PATCHES_OF_SHOOTING: u64 = 10_000;
 
 /// A row that sums to more than 1 by this is worth a warning.
-const ROW_SUM_DOUBT: f64 = 1e-2;
+const ROW_SUM_DOUBT: f64 = 0.1;
 
 /// Form factors between patches, as the solvers ask for them. Each is a pure function of its numbers.
 pub(super) trait Exchange: Sync {
@@ -144,7 +144,8 @@ pub(super) fn solve(
     let start = Instant::now();
     let system = System::new(&mesh, lights::external(scene, &mesh, spec.seed));
     let run = Run {
-        residual: spec.residual,
+        // Not a number asks for as little as there can be.
+        residual: spec.residual.max(0.0),
         max_steps: spec.max_steps.unwrap_or(u64::MAX),
         observe,
     };
