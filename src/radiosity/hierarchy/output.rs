@@ -3,7 +3,7 @@
 use super::gather::Field;
 use super::tree::{Kind, NONE, Tree};
 use super::{Hierarchy, Link, Node};
-use crate::radiosity::mesh::{Cell, Division, Patch};
+use crate::radiosity::mesh::{Cell, Patch};
 use crate::radiosity::report::{self, Balance};
 use crate::radiosity::{PatchMesh, Report, Rgb64, Solution};
 use crate::scene::Scene;
@@ -74,7 +74,7 @@ pub fn mesh(tree: &Tree) -> (PatchMesh, Numbers) {
     let mesh = PatchMesh {
         surfaces: tree.surfaces.clone(),
         patches: numbers.leaf.iter().map(patch).collect(),
-        divisions: tree.grids.iter().map(|g| Division::Grid(*g)).collect(),
+        divisions: tree.divisions.clone(),
         cells,
     };
     (mesh, numbers)
@@ -114,7 +114,7 @@ pub fn solution(scene: &Scene, tree: &Tree, field: &Field, report: Report) -> So
         external: found.external,
         absorbed: found.absorbed,
         other: found.other,
-        warnings: found.warnings,
+        warnings: [found.warnings, tree.left_out.clone()].concat(),
         ..report
     };
     solution

@@ -17,8 +17,8 @@ mod tests;
 use super::form_factors::{FormFactors, Matrix};
 use super::report::{self, Balance};
 use super::{
-    PatchMesh, Progress, Report, Rgb64, Solution, SolveError, SolveSpec, Solver, Surfaces, lights,
-    mesh,
+    PatchMesh, Progress, Report, Rgb64, Solution, SolveError, SolveSpec, Solver, Surfaces,
+    discontinuity, lights, mesh,
 };
 use crate::scene::Scene;
 use std::ops::ControlFlow;
@@ -139,7 +139,7 @@ pub(super) fn solve(
     observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Solution, SolveError> {
     let start = Instant::now();
-    let mesh = divided(scene, surfaces, spec)?;
+    let (mesh, left_out) = divided(scene, surfaces, spec)?;
     let mesh_seconds = start.elapsed().as_secs_f64();
     let start = Instant::now();
     let system = System::new(&mesh, lights::external(scene, &mesh, spec.seed));
@@ -171,6 +171,7 @@ pub(super) fn solve(
     };
     let doubts = doubts(&report, solved.row_sum);
     report.warnings.extend(doubts);
+    report.warnings.extend(left_out);
     Ok(Solution {
         radiosity: solved.radiosity,
         irradiance: solved.irradiance,
@@ -181,12 +182,13 @@ pub(super) fn solve(
     })
 }
 
-/// The mesh that `spec` asks for, refused before it is made where it has too many patches.
+/// The mesh that `spec` asks for, refused where it has too many patches, and what was left out of it: sentences for
+/// the user.
 fn divided(
     scene: &Scene,
     surfaces: Arc<Surfaces>,
     spec: &SolveSpec,
-) -> Result<PatchMesh, SolveError> {
+) -> Result<(PatchMesh, Vec<String>), SolveError> {
     let wanted = match spec.solver {
         Solver::Shooting => PATCHES_OF_SHOOTING,
         _ => PATCHES_OF_MATRIX,
@@ -200,7 +202,17 @@ fn divided(
         return Err(SolveError::TooManyPatches { patches, limit });
     }
     memory::check(spec.solver, patches)?;
-    Ok(PatchMesh::uniform(scene, surfaces, size))
+    if !spec.discontinuities {
+        return Ok((PatchMesh::uniform(scene, surfaces, size), Vec::new()));
+    }
+    let (mesh, found) =
+        discontinuity::mesh(scene, surfaces, size, &discontinuity::Limits::default());
+    let patches = mesh.len() as u64;
+    if patches > limit {
+        return Err(SolveError::TooManyPatches { patches, limit });
+    }
+    memory::check(spec.solver, patches)?;
+    Ok((mesh, found.warnings()))
 }
 
 fn by_spec(
