@@ -5,6 +5,7 @@
 //! of those that get from i. Rows are taken as they are: those that sum to more than 1 are not scaled down in
 //! silence; where light would grow for that reason, it is an error that says so.
 
+mod closure;
 mod direct;
 mod gathering;
 mod memory;
@@ -143,6 +144,7 @@ pub(super) fn solve(
     let mesh_seconds = start.elapsed().as_secs_f64();
     let start = Instant::now();
     let system = System::new(&mesh, lights::external(scene, &mesh, spec.seed));
+    closure::check(scene, &system, spec.seed)?;
     let run = Run {
         // Not a number asks for as little as there can be.
         residual: spec.residual.max(0.0),
@@ -151,10 +153,9 @@ pub(super) fn solve(
     };
     let solved = by_spec(scene, &system, spec, run)?;
     let seconds = start.elapsed().as_secs_f64() - solved.form_factor_seconds;
-    let System { external, .. } = system;
     let balance = Balance {
         mesh: &mesh,
-        external: &external,
+        external: &system.external,
         irradiance: &solved.irradiance,
         escaped: solved.escaped,
     };
@@ -171,6 +172,11 @@ pub(super) fn solve(
     };
     let doubts = doubts(&report, solved.row_sum);
     report.warnings.extend(doubts);
+    if report.converged {
+        let ways = [report.absorbed, report.escaped].map(Rgb64::element_sum);
+        let doubt = closure::doubt(scene, &system, &solved.radiosity, ways, spec.seed);
+        report.warnings.extend(doubt);
+    }
     Ok(Solution {
         radiosity: solved.radiosity,
         irradiance: solved.irradiance,
