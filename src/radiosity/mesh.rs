@@ -292,5 +292,11 @@ pub fn of_piece(scene: &Scene, surfaces: &Surfaces, facet: u32, piece: &Piece) -
     let shape = surfaces.facets()[facet as usize].shape;
     let points = if scene.varies(shape) { 64 } else { 1 };
     let look = |st| on_facet(scene, surfaces, facet, piece, st);
-    optics::mean(scene, look, piece.outline, points)
+    optics::mean(
+        scene,
+        look,
+        piece.outline,
+        points,
+        surfaces.gloss_as_diffuse,
+    )
 }

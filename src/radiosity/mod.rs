@@ -92,6 +92,9 @@ pub struct SolveSpec {
     pub discontinuities: bool,
     /// Curved shapes differ from their facets by at most this share of their radius.
     pub curve_error: f64,
+    /// Treat what opaque surfaces reflect in other ways than diffusely as if it were diffuse. The light is then not
+    /// lost to the solution, but goes astray: better for guiding walks, and for what they read.
+    pub gloss_as_diffuse: bool,
     /// Most patches; more are an error before anything is solved.
     pub max_patches: u64,
     pub seed: u64,
@@ -110,6 +113,7 @@ impl Default for SolveSpec {
             ambient: true,
             discontinuities: false,
             curve_error: 0.02,
+            gloss_as_diffuse: false,
             max_patches: 4_000_000,
             seed: 0,
         }
@@ -280,7 +284,7 @@ pub fn solve(
     spec: &SolveSpec,
     observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Solution, SolveError> {
-    let surfaces = Arc::new(Surfaces::new(scene, spec.curve_error));
+    let surfaces = Arc::new(Surfaces::of(scene, spec.curve_error, spec.gloss_as_diffuse));
     if surfaces.facets().is_empty() {
         return Err(SolveError::NoPatches);
     }

@@ -77,6 +77,9 @@ pub struct Surfaces {
     pub left_out: LeftOut,
     /// Largest distance of a curved shape from its facets, relative to its radius.
     pub curve_error: f64,
+    /// Whether opaque surfaces that reflect in other ways than diffusely are treated as if they did so diffusely:
+    /// their light is not lost, but goes astray.
+    pub gloss_as_diffuse: bool,
 }
 
 const NONE: u32 = u32::MAX;
@@ -89,6 +92,11 @@ impl Surfaces {
     /// Cuts all surfaces of `scene` that stand still. Facets keep nearer to curved shapes than `curve_error` of
     /// their radius. A side without diffuse reflection and emission has no facets.
     pub fn new(scene: &Scene, curve_error: f64) -> Surfaces {
+        Surfaces::of(scene, curve_error, false)
+    }
+
+    /// The same; with `gloss_as_diffuse`, sides that reflect in whatever way have facets.
+    pub fn of(scene: &Scene, curve_error: f64, gloss_as_diffuse: bool) -> Surfaces {
         let world = scene.world();
         let mut surfaces = Surfaces {
             facets: Vec::new(),
@@ -97,6 +105,7 @@ impl Surfaces {
             facet_of: Vec::new(),
             left_out: LeftOut::default(),
             curve_error,
+            gloss_as_diffuse,
         };
         for number in 0..world.geometries().len() as u32 {
             let shape = ShapeId(number);
@@ -320,8 +329,9 @@ impl Surfaces {
                 facet.surface += 1;
             }
             let points = if scene.varies(facet.shape) { 16 } else { 1 };
-            let look = |st| look(scene, &facet, st);
-            if super::optics::takes_part(scene, look, facet.piece.outline, points) {
+            let (look, gloss) = (|st| look(scene, &facet, st), self.gloss_as_diffuse);
+            let outline = facet.piece.outline;
+            if super::optics::takes_part(scene, look, outline, points, gloss) {
                 *number = self.facets.len() as u32;
                 self.facets.push(facet);
             }

@@ -22,7 +22,7 @@ fn quality(room: &Room, method: FormFactorMethod, tolerance: f64) -> (Matrix, Qu
 #[test]
 fn an_empty_box_is_closed() {
     let room = room(&inside(DVec3::ZERO, DVec3::new(2.0, 1.0, 1.0)), 0.4, 1e-3);
-    for (method, tolerance) in METHODS.into_iter().zip([1e-6, 0.02, 1e-12]) {
+    for (method, tolerance) in METHODS.into_iter().zip([1e-6, 0.03, 1e-12]) {
         let (_, quality) = quality(&room, method, tolerance);
         assert_eq!(quality.rows_off, 0.0, "{quality}");
         assert_eq!(quality.self_max, 0.0);
@@ -42,7 +42,8 @@ fn a_furnished_room_is_closed() {
     for (method, mean, most) in [
         (METHODS[0], 2e-3, 0.05),
         (METHODS[1], 2e-3, 0.05),
-        (METHODS[2], 1e-12, 1e-12),
+        // A few pixels at the horizon see past the edges of patches.
+        (METHODS[2], 1e-5, 1e-4),
     ] {
         let (matrix, quality) = quality(&room, method, 0.03);
         assert!((quality.row_sum_mean - 1.0).abs() < mean, "{quality}");

@@ -10,7 +10,7 @@
 //! The error falls with one over the resolution. Patches that cover no middle of a pixel get nothing: they are
 //! counted. Not reciprocal. Masks are opaque here, and what moves or has no surface to divide stops no light.
 
-use super::analytic::{kernel, lambert};
+use super::analytic::lambert;
 use super::polygon::{Polygon, distance2_to_segment};
 use super::raster::{BLOCKED, Buffer, NOTHING};
 use super::{Face, FormFactors, Loss};
@@ -168,9 +168,13 @@ impl FormFactors<'_> {
             if covered[j] > 0 {
                 loss.met.push(j as u32);
             } else if face.faces(other) {
-                loss.lost.push(j as u32);
-                let f = kernel(face.center, face.normal, other.center, other.normal) * other.area;
-                loss.share += f.min(1.0);
+                let seen = other.polygon.clip(|p| (p - face.center).dot(face.normal));
+                let front = (face.center - other.polygon[0]).dot(other.normal) > 0.0;
+                let f = lambert(face.center, face.normal, &seen, other.normal);
+                if front && f > 0.0 {
+                    loss.lost.push(j as u32);
+                    loss.share += f.min(1.0);
+                }
             }
         }
         loss

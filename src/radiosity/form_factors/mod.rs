@@ -54,9 +54,10 @@ impl Matrix {
 /// What a row of hemicubes did not see because of its resolution.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Loss {
-    /// Patches in front that cover the middle of no pixel, whether they would be hidden or not.
+    /// Patches in front of the middle of the row's patch that cover the middle of no pixel, whether they would be
+    /// hidden or not.
     pub lost: Vec<u32>,
-    /// Their form factors, roughly, with nothing in the way.
+    /// Their form factors from there, with nothing in the way.
     pub share: f64,
     /// Patches that cover a pixel, hidden or not.
     pub met: Vec<u32>,

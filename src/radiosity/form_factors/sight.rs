@@ -17,8 +17,8 @@ const KEPT: usize = 1 << 22;
 /// four-dimensional unit cube evenly, whatever their number (a Kronecker sequence, as the golden ratio is for one
 /// dimension; Roberts 2018, "The Unreasonable Effectiveness of Quasirandom Sequences").
 const STEPS: [DVec2; 2] = [
-    DVec2::new(0.856_674_883_854_502_9, 0.733_891_856_627_126_0),
-    DVec2::new(0.628_706_721_037_808_6, 0.538_597_257_223_610_0),
+    DVec2::new(0.856_674_883_854_502_9, 0.733_891_856_627_126),
+    DVec2::new(0.628_706_721_037_808_6, 0.538_597_257_223_61),
 ];
 
 /// Which two of the four dimensions of a pair of points a patch has.

@@ -13,7 +13,7 @@ pub struct Field {
     pub irradiance: Vec<Rgb64>,
     /// What errors are judged against: the geometric mean of the irradiance of the surfaces of each node, in W/m².
     pub usual: Vec<f64>,
-    /// Of the clusters, and cells below: radiant intensity by direction.
+    /// Of the clusters, by their number: radiant intensity by direction.
     intensity: Vec<Sphere>,
 }
 
@@ -46,10 +46,15 @@ fn harmonics(d: DVec3) -> [f64; 9] {
 
 impl Sphere {
     /// A surface of radiosity `b`.
-    fn of_surface(b: Rgb64, area: f64, normal: DVec3) -> Sphere {
+    fn add_surface(&mut self, b: Rgb64, area: f64, normal: DVec3) {
+        if b == Rgb64::ZERO {
+            return;
+        }
         let power = b * (area / PI);
         let y = harmonics(normal);
-        Sphere(std::array::from_fn(|i| power * (COSINE[i] * y[i])))
+        for (c, (cosine, y)) in self.0.iter_mut().zip(COSINE.iter().zip(y)) {
+            *c += power * (cosine * y);
+        }
     }
 
     fn add(&mut self, o: &Sphere) {
@@ -137,20 +142,20 @@ impl Field {
     }
 
     /// Takes the light that there is as what errors are judged against.
-    pub fn judge_by(&mut self, tree: &Tree) {
-        /// Darker than this share of the mean is as good as black.
-        const BLACK: f64 = 1e-3;
+    /// What is darker than `black`, as a share of the mean, counts as that dark.
+    pub fn judge_by(&mut self, tree: &Tree, black: f64) {
         let mean = self.irradiance[0].max_element();
         if !(mean > 0.0) {
             self.usual = vec![self.radiosity[0].max_element(); tree.nodes.len()];
             return;
         }
         // Means of logarithms, pulled up from the patches.
-        let floor = |e: Rgb64| e.max_element().max(BLACK * mean).ln();
+        let floor = |e: Rgb64| e.max_element().max(black * mean).ln();
         let mut logs: Vec<f64> = self.irradiance.iter().map(|e| floor(*e)).collect();
-        for i in (0..self.intensity.len()).rev() {
+        for &i in tree.by_cluster.iter().rev() {
+            let i = i as usize;
             let node = &tree.nodes[i];
-            if node.is_cluster() && node.area > 0.0 {
+            if node.area > 0.0 {
                 let inside = tree.children(i as u32).map(|c| c as usize);
                 let sum: f64 = inside.map(|c| logs[c] * tree.nodes[c].area).sum();
                 logs[i] = sum / node.area;
@@ -186,34 +191,40 @@ impl Field {
     }
 
     fn gathered(&self, tree: &Tree) -> Vec<Vec<Update>> {
+        /// Cells that one task gathers for.
+        const CHUNK: usize = 256;
         let around = self.around_clusters(tree);
-        let gather = |&cell: &u32| {
-            let mut updates = Vec::new();
-            let node = &tree.nodes[cell as usize];
-            let above = match around.get(node.parent as usize) {
-                Some(around) => around.irradiance(node.normal),
-                None => Rgb64::ZERO,
-            };
-            self.push(tree, cell, above, &mut updates);
+        let gather = |cells: &[u32]| {
+            let mut updates = Vec::with_capacity(2 * cells.len());
+            for &cell in cells {
+                let node = &tree.nodes[cell as usize];
+                let above = match tree.clusters.get(node.parent as usize) {
+                    Some(&number) => around[number as usize].irradiance(node.normal),
+                    None => Rgb64::ZERO,
+                };
+                self.push(tree, cell, above, &mut updates);
+            }
             updates
         };
-        tree.cells.par_iter().map(gather).collect()
+        tree.cells.par_chunks(CHUNK).map(gather).collect()
     }
 
     /// The light that arrives at each cluster by its links and those of the clusters around it.
     fn around_clusters(&self, tree: &Tree) -> Vec<Sphere> {
-        let own = |node: &TreeNode| {
+        let own = |&node: &u32| {
+            let node = &tree.nodes[node as usize];
             let mut sum = Sphere::default();
             for link in &node.links {
                 self.add_arriving(tree, node, link, &mut sum);
             }
             sum
         };
-        let nodes = &tree.nodes[..self.intensity.len()];
-        let mut around: Vec<Sphere> = nodes.par_iter().map(own).collect();
+        let mut around: Vec<Sphere> = tree.by_cluster.par_iter().map(own).collect();
         // Clusters come before what they contain.
-        for i in 0..nodes.len() {
-            if let Some(&above) = around.get(nodes[i].parent as usize) {
+        for (i, &node) in tree.by_cluster.iter().enumerate() {
+            let parent = tree.nodes[node as usize].parent;
+            if let Some(&above) = tree.clusters.get(parent as usize) {
+                let above = around[above as usize];
                 around[i].add(&above);
             }
         }
@@ -246,7 +257,9 @@ impl Field {
                 let cos = d.dot(node.normal).max(0.0);
                 self.radiosity[sender as usize] * (node.area * cos / PI)
             }
-            Kind::Cluster { .. } => self.intensity[sender as usize].towards(d),
+            Kind::Cluster { .. } => {
+                self.intensity[tree.clusters[sender as usize] as usize].towards(d)
+            }
         }
     }
 
@@ -303,39 +316,36 @@ impl Field {
 
     /// Means and intensities of the clusters, by what they contain.
     fn pull(&mut self, tree: &Tree) {
-        let count = tree
-            .cells
-            .iter()
-            .copied()
-            .max()
-            .map_or(0, |m| m as usize + 1);
         self.intensity.clear();
-        self.intensity.resize(count, Sphere::default());
-        for i in (0..count).rev() {
+        self.intensity
+            .resize(tree.by_cluster.len(), Sphere::default());
+        for (number, &i) in tree.by_cluster.iter().enumerate().rev() {
+            let i = i as usize;
             let node = &tree.nodes[i];
-            match node.kind {
-                Kind::Surface { .. } => {
-                    let b = self.radiosity[i];
-                    self.intensity[i] = Sphere::of_surface(b, node.area, node.normal);
-                }
-                Kind::Cluster { first, count } => {
-                    let (mut power, mut arriving) = (Rgb64::ZERO, Rgb64::ZERO);
-                    let mut sum = Sphere::default();
-                    for child in first as usize..(first + count) as usize {
-                        power += self.radiosity[child] * tree.nodes[child].area;
-                        arriving += self.irradiance[child] * tree.nodes[child].area;
-                        sum.add(&self.intensity[child]);
+            let (mut power, mut arriving) = (Rgb64::ZERO, Rgb64::ZERO);
+            let mut sum = Sphere::default();
+            for child in tree.children(i as u32).map(|c| c as usize) {
+                let inside = &tree.nodes[child];
+                power += self.radiosity[child] * inside.area;
+                arriving += self.irradiance[child] * inside.area;
+                match inside.kind {
+                    Kind::Surface { .. } => {
+                        sum.add_surface(self.radiosity[child], inside.area, inside.normal);
                     }
-                    let share = if node.area > 0.0 {
-                        1.0 / node.area
-                    } else {
-                        0.0
-                    };
-                    self.radiosity[i] = power * share;
-                    self.irradiance[i] = arriving * share;
-                    self.intensity[i] = sum;
+                    Kind::Cluster { .. } => {
+                        let inside = self.intensity[tree.clusters[child] as usize];
+                        sum.add(&inside);
+                    }
                 }
             }
+            let share = if node.area > 0.0 {
+                1.0 / node.area
+            } else {
+                0.0
+            };
+            self.radiosity[i] = power * share;
+            self.irradiance[i] = arriving * share;
+            self.intensity[number] = sum;
         }
     }
 }

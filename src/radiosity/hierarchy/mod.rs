@@ -58,6 +58,8 @@ pub struct Hierarchy {
 const STEP: f64 = 4.0;
 /// Refinements before the last, at most.
 const LOOSER: i32 = 4;
+/// Irradiance that is no more than this share of the mean is not resolved better than that.
+const BLACK: f64 = 1e-3;
 /// Gathering steps after the last refinement, at most, when no other limit is given.
 const MAX_STEPS: u64 = 10_000;
 
@@ -82,7 +84,9 @@ pub fn solve(
     for looser in (0..=LOOSER).rev() {
         let clock = Instant::now();
         let error = spec.error * STEP.powi(looser);
-        refiner.refine(&mut tree, &mut field, error);
+        // What few links make dark may be brighter than it seems.
+        let black = (BLACK * STEP.powi(looser)).min(0.25);
+        refiner.refine(&mut tree, &mut field, error, black);
         report.form_factor_seconds += clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         // Before the last refinement, it is enough to see where light goes.

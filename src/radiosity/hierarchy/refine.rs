@@ -119,10 +119,10 @@ impl<'a> Refiner<'a> {
     }
 
     /// Links all pairs of nodes so that no link errs by more than `threshold` (see [`errors`]), judged by the light
-    /// of `field`.
-    pub fn refine(&mut self, tree: &mut Tree, field: &mut Field, threshold: f64) {
+    /// of `field`; what is darker than `black`, as a share of the mean, is no better than that.
+    pub fn refine(&mut self, tree: &mut Tree, field: &mut Field, threshold: f64, black: f64) {
         self.coarse = 0;
-        field.judge_by(tree);
+        field.judge_by(tree, black);
         self.refine_external(tree, field, threshold);
         let mut pairs = std::mem::take(&mut self.dormant);
         pairs.extend(self.reconsidered(tree, field, threshold));
