@@ -142,7 +142,8 @@ fn values_at_hits_are_continuous() {
                 let value = display.at(&mesh, &values, located);
                 if let Some(last) = last {
                     let jump = (value - last).abs().max_element();
-                    assert!(jump < 20.0 * step, "{jump} at {x}, {z}");
+                    // Slopes are below 40 here; a vertex that is not shared makes jumps of 0.1.
+                    assert!(jump < 40.0 * step, "{jump} at {x}, {z}");
                 }
                 last = Some(value);
             }

@@ -8,6 +8,7 @@
 //! What other lobes than diffuse ones do to light is left out. The result is biased; it converges with the size
 //! of the patches for scenes of diffuse surfaces.
 
+pub mod discontinuity;
 pub mod display;
 pub mod export;
 pub mod form_factors;

@@ -40,7 +40,7 @@ pub fn at(scene: &Scene, hit: &Hit, u: f32) -> Optics {
     }
 }
 
-/// Whether a side of a surface reflects diffusely or shines, judged by [`mean`].
+/// Whether a side of a surface reflects diffusely or shines, judged at about `points` points.
 pub fn takes_part(
     scene: &Scene,
     look: impl Fn(DVec2) -> Hit,
@@ -54,8 +54,8 @@ pub fn takes_part(
 
 /// The mean over `points` points in the piece's outline, which `look` turns into hits. The points are spread well
 /// but not in rows, which patterns of textures could fall in step with (the sequence R of Roberts 2018, "The
-/// Unreasonable Effectiveness of Quasirandom Sequences").
-/// With `gloss_as_diffuse`, what is reflected in other ways counts as reflected diffusely.
+/// Unreasonable Effectiveness of Quasirandom Sequences"). With `gloss_as_diffuse`, what is reflected in other ways
+/// counts as reflected diffusely.
 pub fn mean(
     scene: &Scene,
     look: impl Fn(DVec2) -> Hit,

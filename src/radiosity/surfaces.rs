@@ -329,9 +329,8 @@ impl Surfaces {
                 facet.surface += 1;
             }
             let points = if scene.varies(facet.shape) { 16 } else { 1 };
-            let (look, gloss) = (|st| look(scene, &facet, st), self.gloss_as_diffuse);
-            let outline = facet.piece.outline;
-            if super::optics::takes_part(scene, look, outline, points, gloss) {
+            let (look, outline) = (|st| look(scene, &facet, st), facet.piece.outline);
+            if super::optics::takes_part(scene, look, outline, points, self.gloss_as_diffuse) {
                 *number = self.facets.len() as u32;
                 self.facets.push(facet);
             }

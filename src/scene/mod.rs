@@ -132,6 +132,11 @@ impl Scene {
         }
     }
 
+    /// All lights, by their ids.
+    pub fn emitters(&self) -> &[Emitter] {
+        self.lights.emitters()
+    }
+
     /// dp/du and dp/dv at a hit, for bump maps; either is zero where it is undefined.
     pub fn dp_duv(&self, hit: &Hit) -> (Vec3, Vec3) {
         self.world.dp_duv(hit)
@@ -321,16 +326,9 @@ impl Scene {
         let (Some(first), second) = (shapes.next(), shapes.next()) else {
             return Err("no surface reflects diffusely");
         };
-        // A flat surface does not see itself, nor does a ball from outside; one that is not flat, or stands in
-        // several places, may.
         let alone = second.is_none() && self.world.placement_of(first).is_none();
-        let geometry = &self.world.geometries()[first.0 as usize];
-        let single = match geometry {
-            Geometry::Mesh(mesh) => mesh.indices().len() == 1,
-            Geometry::Disk(_) => true,
-            _ => false,
-        };
-        match alone && single {
+        let geometry = self.world.geometries().get(first.0 as usize);
+        match alone && geometry.is_some_and(Geometry::is_flat) {
             true => Err("a single flat surface reflects diffusely, which does not light itself"),
             false => Ok(()),
         }

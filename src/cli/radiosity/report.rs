@@ -96,7 +96,7 @@ pub(super) fn written(outputs: &[PathBuf], pictures: usize, folder: Option<&Path
     let files: Vec<String> = outputs.iter().map(|p| p.display().to_string()).collect();
     let mut text = format!("wrote {}", files.join(", "));
     if let Some(folder) = folder {
-        text += &format!("; pictures of {pictures} steps are in {}", folder.display());
+        text += &format!("; {pictures} pictures are in {}", folder.display());
     }
     eprintln!("{text}");
 }

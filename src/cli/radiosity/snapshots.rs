@@ -22,7 +22,6 @@ pub(super) struct Snapshots {
     stop: Stop,
     show: shown::Show,
     metadata: Metadata,
-    last: Option<u64>,
     spent: Duration,
     written: usize,
 }
@@ -52,7 +51,6 @@ impl Snapshots {
                 command_line: command_line.to_string(),
                 ..Metadata::default()
             },
-            last: None,
             spent: Duration::ZERO,
             written: 0,
         })
@@ -85,16 +83,12 @@ impl Snapshots {
             hierarchy: None,
             report: Report::default(),
         };
-        self.write(Arc::new(solution), progress.step)
+        self.write(Arc::new(solution), &format!("step-{:06}", progress.step))
     }
 
     /// Writes the picture of the result.
     pub fn finish(&mut self, solution: &Arc<Solution>) -> Result<(), Failure> {
-        let step = solution.report.steps;
-        match self.last == Some(step) && !self.steps.is_empty() {
-            true => Ok(()),
-            false => self.write(Arc::clone(solution), step),
-        }
+        self.write(Arc::clone(solution), "result")
     }
 
     /// Time that the pictures took.
@@ -106,7 +100,7 @@ impl Snapshots {
         self.written
     }
 
-    fn write(&mut self, solution: Arc<Solution>, step: u64) -> Result<(), Failure> {
+    fn write(&mut self, solution: Arc<Solution>, name: &str) -> Result<(), Failure> {
         let start = Instant::now();
         self.job.integrator = IntegratorSpec::Radiosity(RadiositySpec {
             show: self.show,
@@ -117,10 +111,8 @@ impl Snapshots {
         let (film, stats) = rendered.map_err(|e| Failure::Input(e.to_string()))?;
         let image = self.job.picture(&film, &stats, &self.metadata);
         for extension in ["exr", "png"] {
-            let name = format!("step-{step:06}.{extension}");
-            image.write(self.folder.join(name))?;
+            image.write(self.folder.join(format!("{name}.{extension}")))?;
         }
-        self.last = Some(step);
         self.written += 1;
         self.spent += start.elapsed();
         Ok(())

@@ -51,8 +51,9 @@ pub fn weights(around: &[Around], normal: DVec3) -> Vec<f64> {
 
 /// Newton's method for the minimum over g of log Σ b exp(g · d), whose gradient is the mean of d.
 fn tilted(base: &[f64], ways: &[DVec2]) -> Option<Vec<f64>> {
-    /// Ways are of length about 1: what is steeper than this has the vertex outside, or all but so.
-    const STEEPEST: f64 = 20.0;
+    /// The longest way is of length about 1, but a small patch beside a large one has a short way and may need
+    /// this much to change its weight.
+    const STEEPEST: f64 = 300.0;
     let mut g = DVec2::ZERO;
     let moments = |g: DVec2| {
         let mut sum = 0.0;
@@ -73,7 +74,7 @@ fn tilted(base: &[f64], ways: &[DVec2]) -> Option<Vec<f64>> {
         ];
         (sum, mean, square)
     };
-    for _ in 0..40 {
+    for _ in 0..60 {
         let (sum, mean, [xx, xy, yy]) = moments(g);
         if mean.length() < 1e-12 {
             let weight = |(b, d): (&f64, &DVec2)| b * g.dot(*d).exp() / sum;
@@ -84,10 +85,10 @@ fn tilted(base: &[f64], ways: &[DVec2]) -> Option<Vec<f64>> {
             return None;
         }
         let step = -DVec2::new(yy * mean.x - xy * mean.y, xx * mean.y - xy * mean.x) / det;
-        // Shorter, until the function falls by enough.
+        // Shorter, until the function falls by enough, as far as rounding lets that be seen.
         let mut share = 1.0;
         while share > 1e-3
-            && moments(g + step * share).0.ln() > sum.ln() + 0.1 * share * mean.dot(step)
+            && moments(g + step * share).0.ln() > sum.ln() + 0.1 * share * mean.dot(step) + 1e-14
         {
             share *= 0.5;
         }
