@@ -16,7 +16,7 @@ fn scale_does_not_matter() {
             let other = at(scale, solver);
             // Rays that graze an edge may end on either side of it.
             let off = mean_difference(&one, &other);
-            assert!(off < 1e-3, "{solver:?} {scale}: {off}");
+            assert!(off < 3e-3, "{solver:?} {scale}: {off}");
         }
     }
 }

@@ -214,3 +214,32 @@ fn threads_change_nothing() {
         assert_eq!(one.report.escaped, four.report.escaped, "{solver:?}");
     }
 }
+
+/// Where form factors decide how bright all is, a bad one is doubted.
+#[test]
+fn form_factors_that_decide_the_brightness_are_doubted() {
+    let scene = scene(&box_inside(1.0, &(diffuse(0.999) + &shining(2.0))));
+    let warnings = |spec| solve(&scene, &spec).report.warnings;
+    let crude = warnings(spec(Solver::GaussSeidel, 1.0, 1e-6));
+    assert_eq!(crude.len(), 1, "{crude:?}");
+    assert!(
+        crude[0].contains("gets out at each reflection"),
+        "{crude:?}"
+    );
+    assert_eq!(warnings(exact(Solver::GaussSeidel, 1.0, 1e-6)).len(), 0);
+}
+
+/// Patches that follow the edges of shadows are solved for like others.
+#[test]
+fn meshes_with_edges_of_shadows_have_about_the_same_light() {
+    let scene = scene(&room_of_blocks(1.0, 0.3));
+    let plain = spec(Solver::GaussSeidel, 0.4, 1e-6);
+    let cut = SolveSpec {
+        discontinuities: true,
+        ..plain.clone()
+    };
+    let (plain, cut) = (solve(&scene, &plain), solve(&scene, &cut));
+    assert!(cut.mesh.len() > plain.mesh.len());
+    let ratio = cut.report.absorbed / plain.report.absorbed;
+    assert!((ratio - 1.0).abs().max_element() < 0.05, "{ratio}");
+}
