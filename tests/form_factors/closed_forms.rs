@@ -183,7 +183,8 @@ fn monte_carlo_is_unbiased() {
     const SEEDS: u32 = 24;
     let cases = rectangles().into_iter().map(|case| (case, 192));
     // The sum over many small patches errs less.
-    for (case, samples) in cases.chain(curved().into_iter().map(|case| (case, 24))) {
+    let ball = curved().pop();
+    for (case, samples) in cases.chain(ball.into_iter().map(|case| (case, 24))) {
         let mut seed = 0;
         let (mean, error) = crate::common::mean_and_error(SEEDS, || {
             seed += 1;

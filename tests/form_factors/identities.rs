@@ -105,7 +105,7 @@ fn small_patches_are_not_lost_in_silence() {
         "{coarse}"
     );
     assert!(coarse.lost_area < 1e-4 && coarse.to_string().contains("raise the resolution"));
-    let (_, fine) = quality(&room, Hemicube { resolution: 1024 }, 0.01);
+    let (_, fine) = quality(&room, Hemicube { resolution: 512 }, 0.01);
     assert_eq!(fine.lost_patches, 0, "{fine}");
 }
 
