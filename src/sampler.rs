@@ -96,6 +96,16 @@ impl Sampler {
         }
     }
 
+    /// Independent numbers for what is tried beside the sample, which does not change it.
+    #[inline]
+    pub fn of_comparison(self) -> Sampler {
+        Sampler {
+            kind: SamplerKind::Independent,
+            stream: mix(self.stream ^ 0x636f_6d70_6172_6501),
+            ..self
+        }
+    }
+
     /// The numbers of part `i` of `n` that the sample is split into from some vertex on: all parts of all
     /// samples are spread together.
     #[inline]

@@ -89,6 +89,7 @@ fn combined(max_depth: u32, show: Show, radius: f32) -> IntegratorSpec {
             ..PhotonSpec::default()
         },
         show,
+        ..CombinedSpec::default()
     })
 }
 

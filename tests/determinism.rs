@@ -55,10 +55,11 @@ fn stopping_early_equals_asking_for_less() {
         .render(Stop::Spp(512), |film, _| match film.spp() >= stop_at {
             true => ControlFlow::Break(()),
             false => ControlFlow::Continue(()),
-        });
+        })
+        .unwrap();
     // Passes depend on the clock, so the stop may come later than asked.
     let mut film = compiled.job.new_film(Stop::Spp(512));
-    compiled.job.add_samples(&mut film, stopped.spp());
+    compiled.job.add_samples(&mut film, stopped.spp()).unwrap();
     assert!(film.mean() == stopped.mean());
 }
 

@@ -23,7 +23,7 @@ fn rendered(integrator: &str, spp: u64, threads: usize) -> (f64, Vec<(f64, Techn
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let (film, stats) = pool.unwrap().install(|| {
         let mut film = compiled.job.new_film(Stop::Spp(spp));
-        let stats = compiled.job.add_samples(&mut film, spp);
+        let stats = compiled.job.add_samples(&mut film, spp).unwrap();
         (film, stats)
     });
     let luminance = |v: &[f64; 3]| f64::from(Rgb::from_array(v.map(|v| v as f32)).luminance());

@@ -187,6 +187,24 @@ impl Bsdf {
         }
     }
 
+    /// Whether no light passes through.
+    #[inline]
+    pub fn is_opaque(&self) -> bool {
+        match self {
+            Bsdf::Diffuse(_)
+            | Bsdf::Conductor(_)
+            | Bsdf::RoughConductor(_)
+            | Bsdf::Plastic(_)
+            | Bsdf::RoughPlastic(_) => true,
+            Bsdf::Principled(b) => b.spec_trans == 0.0,
+            Bsdf::Dielectric(_)
+            | Bsdf::ThinDielectric(_)
+            | Bsdf::RoughDielectric(_)
+            | Bsdf::PrincipledThin(_)
+            | Bsdf::Null(_) => false,
+        }
+    }
+
     /// Whether [`Bsdf::sample`] uses `u_lobe`.
     #[inline]
     pub fn has_lobes(&self) -> bool {
@@ -206,6 +224,36 @@ impl Bsdf {
     #[inline]
     pub fn is_diffuse(&self) -> bool {
         matches!(self, Bsdf::Diffuse(_))
+    }
+
+    /// Whether all lobes but delta ones are diffuse, and there is one: irradiance is all there is to know of the
+    /// light that these scatter.
+    #[inline]
+    pub fn is_matte(&self) -> bool {
+        matches!(self, Bsdf::Diffuse(_) | Bsdf::Plastic(_))
+    }
+
+    /// Share of light that arrives equally from all directions which the diffuse lobe sends towards `wo`, as
+    /// radiance over radiance; 0 where there is none that can be told from other lobes.
+    #[inline]
+    pub fn diffuse_towards(&self, wo: Vec3) -> Rgb {
+        match self {
+            Bsdf::Diffuse(b) if wo.z > 0.0 => b.albedo,
+            Bsdf::Plastic(b) if wo.z > 0.0 => b.diffuse_towards(wo),
+            Bsdf::RoughPlastic(b) if wo.z > 0.0 => b.diffuse_towards(wo),
+            _ => Rgb::BLACK,
+        }
+    }
+
+    /// What is left without that lobe; `None` if that is nothing.
+    #[inline]
+    pub fn without_diffuse(&self) -> Option<Bsdf> {
+        match self {
+            Bsdf::Diffuse(_) => None,
+            Bsdf::Plastic(b) => b.without_diffuse().map(Bsdf::Plastic),
+            Bsdf::RoughPlastic(b) => b.without_diffuse().map(Bsdf::RoughPlastic),
+            other => Some(*other),
+        }
     }
 
     /// Reflectance of the diffuse lobe for light that arrives equally from all directions, 0 without one.

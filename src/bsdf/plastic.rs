@@ -139,6 +139,22 @@ impl Plastic {
         })
     }
 
+    /// Share of diffuse light that the base sends back towards `wo`, above the surface.
+    #[inline]
+    pub(super) fn diffuse_towards(&self, wo: Vec3) -> Rgb {
+        self.body * ((1.0 - self.reflected(wo.z)) * self.entering())
+    }
+
+    /// The boundary alone, over a black base; `None` if that is black too.
+    #[inline]
+    pub(super) fn without_diffuse(&self) -> Option<Plastic> {
+        (!self.reflectance.is_black()).then_some(Plastic {
+            body: Rgb::BLACK,
+            specular_share: 1.0,
+            ..*self
+        })
+    }
+
     /// Share of diffuse light that the base sends back.
     pub(super) fn diffuse_albedo(&self) -> Rgb {
         let entering = self.entering();

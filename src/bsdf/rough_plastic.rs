@@ -267,6 +267,22 @@ impl RoughPlastic {
         })
     }
 
+    /// Share of diffuse light that the base sends back towards `wo`, above the surface.
+    #[inline]
+    pub(super) fn diffuse_towards(&self, wo: Vec3) -> Rgb {
+        self.body * (self.coat.through(wo.z) * self.coat.entering)
+    }
+
+    /// The boundary alone, over a black base; `None` if that is black too.
+    #[inline]
+    pub(super) fn without_diffuse(&self) -> Option<RoughPlastic> {
+        (!self.reflectance.is_black()).then_some(RoughPlastic {
+            body: Rgb::BLACK,
+            specular_share: 1.0,
+            ..*self
+        })
+    }
+
     /// Share of diffuse light that the base sends back.
     pub(super) fn diffuse_albedo(&self) -> Rgb {
         self.body * (self.coat.entering * self.coat.entering)

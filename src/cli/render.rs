@@ -28,6 +28,9 @@ pub struct RenderArgs {
     /// Use this integrator in place of the scene's
     #[arg(long, value_name = "NAME")]
     pub integrator: Option<String>,
+    /// How a path tracer finds light between diffuse surfaces: none (by itself), gather (from radiosity)
+    #[arg(long, value_name = "WAY")]
+    pub indirect: Option<String>,
     /// Use this sampler in place of the scene's: sobol, independent
     #[arg(long, value_name = "NAME")]
     pub sampler: Option<String>,
@@ -121,7 +124,7 @@ pub fn parse_define(text: &str) -> Result<(String, String), String> {
 
 pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
     let stopped = Arc::new(AtomicBool::new(false));
-    watch_for_interrupt(&stopped)?;
+    watch_for_interrupt(&stopped, "pass")?;
     let pool = pool(args.threads)?;
     let outputs = outputs(args);
     if let Some(unknown) = outputs.iter().find(|p| !Image::can_write_extension(p)) {
@@ -139,6 +142,7 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
     let load = start.elapsed();
     let overrides = Overrides {
         integrator: args.integrator.clone(),
+        indirect: args.indirect.clone(),
         sampler: args.sampler.clone(),
         max_depth: args.max_depth,
         resolution: args.resolution,
@@ -163,7 +167,7 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
     };
     let job = &compiled.job;
     let mut progress = Progress::new(args.progress);
-    let (film, stats) = pool.install(|| {
+    let rendered = pool.install(|| {
         job.render(stop, |film, stats| {
             progress.update(film, stats, stop);
             match stopped.load(Ordering::Relaxed) {
@@ -173,6 +177,9 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
         })
     });
     progress.finish();
+    let (film, stats) = rendered.map_err(|e| Failure::Input(e.to_string()))?;
+    let warnings = stats.solution.iter().flat_map(|report| &report.warnings);
+    warnings.for_each(|warning| eprintln!("warning: {warning}"));
     let threads = pool.current_num_threads();
 
     let write_start = Instant::now();
@@ -212,29 +219,32 @@ struct Seconds {
     write: Duration,
 }
 
-/// First Ctrl-C: finish the pass and write. Second: end at once.
-fn watch_for_interrupt(stopped: &Arc<AtomicBool>) -> Result<(), Failure> {
+/// First Ctrl-C: finish the pass, or whatever the `work` is made of, and write. Second: end at once.
+pub(super) fn watch_for_interrupt(
+    stopped: &Arc<AtomicBool>,
+    work: &'static str,
+) -> Result<(), Failure> {
     let flag = Arc::clone(stopped);
     let handler = move || {
         if flag.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }
         eprintln!(
-            "\nstopping after this pass and writing what is done; press Ctrl-C again to end at once"
+            "\nstopping after this {work} and writing what is done; press Ctrl-C again to end at once"
         );
     };
     ctrlc::set_handler(handler).map_err(|e| Failure::Input(format!("cannot watch for Ctrl-C: {e}")))
 }
 
 /// The threads that were asked for.
-fn pool(threads: Option<u16>) -> Result<ThreadPool, Failure> {
+pub(super) fn pool(threads: Option<u16>) -> Result<ThreadPool, Failure> {
     let count = threads.map_or(0, usize::from);
     let pool = ThreadPoolBuilder::new().num_threads(count).build();
     pool.map_err(|e| Failure::Usage(format!("cannot start {count} threads: {e}")))
 }
 
 /// The scene's file name without folder and extension.
-fn scene_name(scene: Option<&Path>) -> String {
+pub(super) fn scene_name(scene: Option<&Path>) -> String {
     let stem = scene
         .and_then(Path::file_stem)
         .map(|s| s.to_string_lossy().into_owned());
@@ -261,6 +271,16 @@ fn write_all(image: &Image, outputs: &[PathBuf]) -> Result<(), Failure> {
         .map_err(Failure::from)
 }
 
+/// Bias that reading radiosity gave to the mean of the picture, and its standard error, relative to that mean.
+fn cache_bias(film: &Film, stats: &Stats) -> Option<[f64; 2]> {
+    let window = film.window();
+    let pixels = u64::from(window.width) * u64::from(window.height);
+    let luminance = |[r, g, b]: &[f64; 3]| 0.2126 * r + 0.7152 * g + 0.0722 * b;
+    let mean = film.mean().iter().map(luminance).sum::<f64>() / pixels as f64;
+    let bias = stats.bias.mean(pixels * film.spp())?;
+    (mean > 0.0).then(|| bias.map(|b| b / mean))
+}
+
 /// One line: what was done, how fast, and how large the error is.
 fn summary(film: &Film, stats: &Stats, outputs: &[PathBuf]) -> String {
     let error = match film.estimate_error() {
@@ -276,13 +296,21 @@ fn summary(film: &Film, stats: &Stats, outputs: &[PathBuf]) -> String {
             film.spp()
         ),
     };
+    let bias = match cache_bias(film, stats) {
+        Some([mean, stderr]) => format!(
+            "; bias by radiosity {:+.2} % (standard error {:.2} %) of the picture's mean",
+            100.0 * mean,
+            100.0 * stderr
+        ),
+        None => String::new(),
+    };
     let files = outputs
         .iter()
         .map(|p| p.display().to_string())
         .collect::<Vec<_>>()
         .join(", ");
     format!(
-        "{} samples per pixel in {}, {:.2} Mrays/s; {error}; wrote {files}",
+        "{} samples per pixel in {}, {:.2} Mrays/s; {error}{bias}; wrote {files}",
         film.spp(),
         human_seconds(stats.seconds),
         stats.rays_per_second() / 1e6
@@ -328,6 +356,12 @@ fn statistics(
         clock["camera"] = json!(phases.samples);
         clock["splats"] = json!(phases.splats);
     }
+    if let Some(report) = &stats.solution {
+        clock["radiosity"] = json!(phases.radiosity);
+        clock["radiosity_mesh"] = json!(report.mesh_seconds);
+        clock["radiosity_form_factors"] = json!(report.form_factor_seconds);
+        clock["radiosity_solve"] = json!(report.solve_seconds);
+    }
     let describe = |t: &TechniqueStats| {
         json!({
             "name": t.name,
@@ -357,12 +391,27 @@ fn statistics(
         "estimated_error": film.estimate_error().map(|e| json!({ "relmse": e.relmse, "ci95": e.ci95 })),
         "invalid_samples": stats.invalid.count,
         "techniques": techniques,
+        "radiosity": stats.solution.as_ref().map(|r| json!({
+            "patches": r.patches,
+            "links": r.links,
+            "steps": r.steps,
+            "residual": r.residual,
+            "converged": r.converged,
+            "other": r.other,
+        })),
+        "bias": cache_bias(film, stats).map(|[mean, stderr]| json!({
+            "of": "light between diffuse surfaces read from radiosity, relative to the picture's mean",
+            "mean": mean,
+            "stderr": stderr,
+            "reads": stats.bias.reads,
+            "compared": stats.bias.compared,
+        })),
         "plan": plan,
     })
 }
 
 /// Most memory the program has held, in bytes, where the system tells it (Linux).
-fn peak_memory() -> Option<u64> {
+pub(super) fn peak_memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
     let kib: u64 = line.split_whitespace().nth(1)?.parse().ok()?;

@@ -204,6 +204,36 @@ impl Geometry {
         matches!(self, Geometry::Mesh(_) | Geometry::Deforming(_))
     }
 
+    /// Whether the whole shape lies in a plane, as far as rounded coordinates tell: no part of it sees another.
+    pub fn is_flat(&self) -> bool {
+        match self {
+            Geometry::Disk(_) => true,
+            Geometry::Mesh(mesh) => {
+                let corners = |i: u32| mesh.triangle(i).map(Vec3::as_dvec3);
+                let mut normal = DVec3::ZERO;
+                let mut size = 0.0;
+                for [a, b, c] in (0..mesh.indices().len() as u32).map(corners) {
+                    // The largest triangle's: its own rounding tilts it least.
+                    let n = (b - a).cross(c - a);
+                    if n.length() > normal.length() {
+                        normal = n;
+                    }
+                    size = f64::max(size, a.abs().max(b.abs()).max(c.abs()).max_element());
+                }
+                let rounding = 8.0 * f64::from(f32::EPSILON) * size;
+                let normal = normal.normalize_or_zero();
+                let origin = match mesh.indices().is_empty() {
+                    true => DVec3::ZERO,
+                    false => corners(0)[0],
+                };
+                (0..mesh.indices().len() as u32)
+                    .flat_map(corners)
+                    .all(|p| (p - origin).dot(normal).abs() <= rounding)
+            }
+            _ => false,
+        }
+    }
+
     /// Triangles of a mesh; 1 for any other shape.
     pub fn prim_count(&self) -> u32 {
         match self {

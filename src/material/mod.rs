@@ -187,6 +187,21 @@ impl Material {
         }
     }
 
+    /// Whether some part of the material has a diffuse lobe that is not black.
+    pub fn is_diffuse(&self) -> bool {
+        match self {
+            Material::Uniform(bsdf) | Material::UniformBothSides(bsdf) => {
+                !bsdf.diffuse_albedo().is_black()
+            }
+            Material::TwoSided { front, back } => front.is_diffuse() || back.is_diffuse(),
+            Material::Mask { inside, .. } | Material::Relief { inside, .. } => inside.is_diffuse(),
+            Material::Blend { parts, .. } => parts.iter().any(Material::is_diffuse),
+            Material::Diffuse { .. } | Material::Coated(_) => true,
+            Material::Principled(_) | Material::PrincipledThin(_) => true,
+            _ => false,
+        }
+    }
+
     /// Whether some part of the material has a lobe that is neither a delta nor a diffuse one.
     pub fn is_glossy(&self) -> bool {
         match self {

@@ -140,6 +140,20 @@ impl Shading {
         self.bsdf.albedo(self.wo)
     }
 
+    /// Share of light that arrives equally from all directions which the diffuse lobe sends to `hit.wo` (see
+    /// [`Bsdf::diffuse_towards`]).
+    #[inline]
+    pub fn diffuse_share(&self) -> Rgb {
+        self.bsdf.diffuse_towards(self.wo)
+    }
+
+    /// The surface without that lobe; `None` if nothing is left.
+    #[inline]
+    pub fn without_diffuse(&self) -> Option<Shading> {
+        let bsdf = self.bsdf.without_diffuse()?;
+        Some(Shading { bsdf, ..*self })
+    }
+
     /// Shading normal, on the side the BSDF calls its outside.
     pub fn normal(&self) -> Vec3 {
         self.frame.n

@@ -3,7 +3,7 @@
 use super::Rgb64;
 use super::optics::{self, Optics};
 use super::piece::{Outline, Piece};
-use super::surfaces::Surfaces;
+use super::surfaces::{Facet, Surfaces};
 use super::triangulation::Triangulation;
 use crate::geom::Hit;
 use crate::math::DVec2;
@@ -204,18 +204,61 @@ impl PatchMesh {
     }
 }
 
+/// Most patches that a mesh can number.
+pub const MOST_PATCHES: u64 = 1 << 30;
+
 /// Columns and rows of a facet for edges of at most `size`; also without a limit, cells are at most twice as
-/// long as they are wide.
+/// long as they are wide, but for needles.
 pub fn cells_for(piece: &Piece, size: f64) -> [u32; 2] {
-    /// Keeps a wrong size from filling the memory with a single facet; callers refuse such meshes before.
-    const MOST: f64 = 4096.0;
-    let count = |length: f64, size: f64| (length / size).ceil().clamp(1.0, MOST) as u32;
+    // Callers refuse what has more cells than this before.
+    parts(piece, size).map(|n| n.min(f64::from(1 << 15)) as u32)
+}
+
+/// How many patches [`PatchMesh::uniform`] makes of `surfaces`.
+pub fn count(surfaces: &Surfaces, size: f64) -> u64 {
+    let of = |facet: &Facet| {
+        let [a, b] = parts(&facet.piece, size);
+        a * b
+    };
+    surfaces.facets().iter().map(of).sum::<f64>() as u64
+}
+
+/// The smallest size, within 2 %, that makes at most `wanted` patches of `surfaces`; infinity where whole facets
+/// are more than that.
+pub fn size_for(surfaces: &Surfaces, wanted: u64) -> f64 {
+    let edges = surfaces.facets().iter().map(|f| f.piece.longest_edge());
+    let longest = edges.fold(0.0, f64::max);
+    if count(surfaces, longest) > wanted || longest <= 0.0 {
+        return f64::INFINITY;
+    }
+    let (mut small, mut large) = (longest, longest);
+    while count(surfaces, small) <= wanted && small > f64::MIN_POSITIVE {
+        large = small;
+        small *= 0.5;
+    }
+    while large > 1.02 * small {
+        let middle = (large * small).sqrt();
+        match count(surfaces, middle) > wanted {
+            true => small = middle,
+            false => large = middle,
+        }
+    }
+    large
+}
+
+/// Columns and rows, which may be more than fit into an integer.
+fn parts(piece: &Piece, size: f64) -> [f64; 2] {
+    /// Into how many parts a needle is cut for its shape alone.
+    const MOST: f64 = 64.0;
+    /// By how much an edge may be longer, relatively, so that rounding makes no more of it.
+    const ROUNDING: f64 = 1e-6;
+    let part = |length: f64, size: f64| (length / size * (1.0 - ROUNDING)).ceil().max(1.0);
     match piece.outline {
-        Outline::Triangle => [count(piece.longest_edge(), size); 2],
+        Outline::Triangle => [part(piece.longest_edge(), size); 2],
         Outline::Parallelogram => {
             let (a, b) = (piece.e1.length(), piece.e2.length());
-            let size = size.min(2.0 * a.min(b));
-            [count(a, size), count(b, size)]
+            let shape = (2.0 * a.min(b)).max(a.max(b) / MOST);
+            [part(a, size.min(shape)), part(b, size.min(shape))]
         }
     }
 }
@@ -247,7 +290,13 @@ pub fn patches(scene: &Scene, surfaces: &Surfaces, pieces: &[(u32, Piece)]) -> V
 /// Optics averaged over a piece of a facet: over more points where the material varies.
 pub fn of_piece(scene: &Scene, surfaces: &Surfaces, facet: u32, piece: &Piece) -> Optics {
     let shape = surfaces.facets()[facet as usize].shape;
-    let points = if scene.varies(shape) { 36 } else { 1 };
+    let points = if scene.varies(shape) { 64 } else { 1 };
     let look = |st| on_facet(scene, surfaces, facet, piece, st);
-    optics::mean(scene, look, piece.outline, points)
+    optics::mean(
+        scene,
+        look,
+        piece.outline,
+        points,
+        surfaces.gloss_as_diffuse,
+    )
 }

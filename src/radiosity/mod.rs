@@ -8,14 +8,22 @@
 //! What other lobes than diffuse ones do to light is left out. The result is biased; it converges with the size
 //! of the patches for scenes of diffuse surfaces.
 
+pub mod discontinuity;
+pub mod display;
+pub mod export;
 pub mod form_factors;
 pub mod hierarchy;
+pub mod lights;
 pub mod mesh;
 pub mod optics;
 pub mod piece;
+pub mod polygon;
+mod report;
+mod solvers;
 pub mod surfaces;
 pub mod triangulation;
 
+pub use display::Display;
 pub use form_factors::FormFactors;
 pub use hierarchy::Hierarchy;
 pub use mesh::{Located, Patch, PatchMesh};
@@ -65,17 +73,19 @@ pub enum Solver {
 pub struct SolveSpec {
     pub solver: Solver,
     pub form_factors: FormFactorMethod,
-    /// Longest edge of a patch in scene units; `None`: a part of the size of the scene. The hierarchical solver
+    /// Longest edge of a patch in scene units; `None`: what gives about 2,000 patches, of which all form factors
+    /// are kept, or 10,000 for shooting; a part of the size of the scene for the hierarchical solver. The hierarchical solver
     /// begins with whole facets and makes no patch with a longer edge than this in the end, nor a shorter one
     /// than `min_size`.
     pub patch_size: Option<f64>,
     /// Shortest edge that the hierarchical solver makes; `None`: a part of the size of the scene.
     pub min_size: Option<f64>,
-    /// Greatest error of a link of the hierarchical solver, as a share of the power that the scene emits.
+    /// Greatest error of a link of the hierarchical solver: the error of its receiver's irradiance as a share of
+    /// the irradiance that is usual there, times the receiver's share of the area of all surfaces.
     pub error: f64,
     /// The iteration ends when the residual, relative to the emitted power, is less.
     pub residual: f64,
-    /// Most steps of an iterative solver: sweeps, or patches that shoot.
+    /// Most steps of an iterative solver: sweeps, or patches that shoot; `None`: as many as it takes.
     pub max_steps: Option<u64>,
     /// Show light that is not shot yet as if it were spread everywhere (shooting only; display, not result).
     pub ambient: bool,
@@ -83,6 +93,9 @@ pub struct SolveSpec {
     pub discontinuities: bool,
     /// Curved shapes differ from their facets by at most this share of their radius.
     pub curve_error: f64,
+    /// Treat what opaque surfaces reflect in other ways than diffusely as if it were diffuse. The light is then not
+    /// lost to the solution, but goes astray: better for guiding walks, and for what they read.
+    pub gloss_as_diffuse: bool,
     /// Most patches; more are an error before anything is solved.
     pub max_patches: u64,
     pub seed: u64,
@@ -101,6 +114,7 @@ impl Default for SolveSpec {
             ambient: true,
             discontinuities: false,
             curve_error: 0.02,
+            gloss_as_diffuse: false,
             max_patches: 4_000_000,
             seed: 0,
         }
@@ -134,7 +148,9 @@ pub struct Report {
     /// W, per channel: emitted by patches and, in `external`, arriving from lights that are no patches.
     pub emitted: Rgb64,
     pub external: Rgb64,
-    /// Taken in by surfaces, and lost from the scene: together what was emitted, up to the residual.
+    /// Taken in by surfaces, and lost from the scene: together what was emitted, up to the residual. What is lost
+    /// is what patches give less what patches get, so that it has the error of the form factors: it may be
+    /// somewhat below 0 in a closed scene.
     pub absorbed: Rgb64,
     pub escaped: Rgb64,
     /// Share of the light that arrives at patches that they scatter in ways which radiosity leaves out.
@@ -184,8 +200,13 @@ pub enum SolveError {
     },
     /// A closed scene that absorbs nothing has no finite solution.
     NoAbsorption,
-    /// The observer asked to stop.
-    Stopped,
+    /// The form factors of a patch sum to more than 1, so that its light grows though some is absorbed.
+    Diverges {
+        solver: &'static str,
+        row_sum: f64,
+        /// The largest reflectance of a patch.
+        albedo: f64,
+    },
 }
 
 impl fmt::Display for SolveError {
@@ -211,7 +232,16 @@ impl fmt::Display for SolveError {
             SolveError::NoAbsorption => f.write_str(
                 "the scene is closed and absorbs nothing: its radiosity grows without limit",
             ),
-            SolveError::Stopped => f.write_str("stopped"),
+            SolveError::Diverges {
+                solver,
+                row_sum,
+                albedo,
+            } => write!(
+                f,
+                "the solver {solver} does not converge: form factors of a patch sum to {row_sum:.6}, which a \
+                 reflectance of {albedo} makes grow; use more samples, a higher resolution or the analytic form \
+                 factors"
+            ),
         }
     }
 }
@@ -248,19 +278,19 @@ impl FormFactorMethod {
     }
 }
 
-/// The radiosity of `scene`. `observe` sees every step and may stop the work; what is done until then is the
-/// result.
+/// The radiosity of `scene`. `observe` sees every step and may stop the work: what is done until then is the
+/// result, with a report that says that it has not converged.
 pub fn solve(
     scene: &Scene,
     spec: &SolveSpec,
     observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Solution, SolveError> {
-    let surfaces = Arc::new(Surfaces::new(scene, spec.curve_error));
+    let surfaces = Arc::new(Surfaces::of(scene, spec.curve_error, spec.gloss_as_diffuse));
     if surfaces.facets().is_empty() {
         return Err(SolveError::NoPatches);
     }
     match spec.solver {
         Solver::Hierarchical => hierarchy::solve(scene, surfaces, spec, observe),
-        _ => Err(SolveError::NoPatches),
+        _ => solvers::solve(scene, surfaces, spec, observe),
     }
 }

@@ -7,6 +7,7 @@ mod techniques;
 pub use picture::{ComponentFormat, Metadata, PixelFormat};
 pub use techniques::TechniqueStats;
 
+use std::fmt;
 use std::ops::{ControlFlow, Range};
 use std::time::{Duration, Instant};
 
@@ -14,11 +15,12 @@ use rayon::prelude::*;
 
 use crate::film::{self, ErrorEstimate, Film, FilmSpec, FilterSampler, SplatBuffer, Tile};
 use crate::math::{Rgb, Vec2};
+use crate::radiosity::{Report, SolveError};
 use crate::sampler::{Sampler, SamplerKind, dim};
 use crate::scene::{Camera, CameraSample, Scene};
 use crate::transport::aov::{self, Aov};
 use crate::transport::{
-    IntegratorSpec, Iteration, Ledger, PathStats, PerTechnique, Setting, Technique, Transport,
+    Bias, IntegratorSpec, Iteration, Ledger, PathStats, PerTechnique, Setting, Technique, Transport,
 };
 
 /// A layer of arbitrary output variables that the picture gets beside its colours.
@@ -82,13 +84,48 @@ pub struct Stats {
     /// Radius of the disk that photons are gathered from in the first and in the last iteration, in scene units;
     /// `None` where there is none.
     pub radius: Option<[f32; 2]>,
+    /// How far the solving for radiosity has come, while it is under way.
+    pub solving: Option<SolvingStep>,
+    /// What the solution is known to be, where there is one.
+    pub solution: Option<Report>,
+    /// What reading it did to the picture.
+    pub bias: Bias,
 }
+
+/// A step of solving for radiosity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SolvingStep {
+    /// From 1.
+    pub step: u64,
+    pub patches: usize,
+    /// Relative to the emitted power.
+    pub residual: f64,
+}
+
+/// Why nothing was rendered.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RenderError {
+    /// Radiosity is asked for, and the scene has none.
+    Radiosity(SolveError),
+}
+
+impl fmt::Display for RenderError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            RenderError::Radiosity(why) => write!(f, "cannot solve for radiosity: {why}"),
+        }
+    }
+}
+
+impl std::error::Error for RenderError {}
 
 /// Where the time went, in seconds on the clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Phases {
-    /// What all iterations share.
+    /// What all iterations share, but for radiosity.
     pub setup: f64,
+    /// Solving for radiosity.
+    pub radiosity: f64,
     /// Shooting photons.
     pub photons: f64,
     /// Sorting them into maps.
@@ -102,7 +139,7 @@ pub struct Phases {
 impl Phases {
     /// What went before the samples.
     pub fn precompute(&self) -> f64 {
-        self.setup + self.photons + self.map
+        self.setup + self.radiosity + self.photons + self.map
     }
 }
 
@@ -112,11 +149,14 @@ impl Stats {
         self.seconds += later.seconds;
         self.invalid.merge(later.invalid);
         self.shot += later.shot;
+        self.bias += later.bias;
+        self.solution = later.solution.or(self.solution.take());
         for (sum, n) in self.connections.iter_mut().zip(later.connections) {
             *sum += n;
         }
         let (sum, more) = (&mut self.phases, later.phases);
         sum.setup += more.setup;
+        sum.radiosity += more.radiosity;
         sum.photons += more.photons;
         sum.map += more.map;
         sum.samples += more.samples;
@@ -129,6 +169,7 @@ impl Stats {
 
     fn add_ledger(&mut self, ledger: &Ledger) {
         self.rays += ledger.rays;
+        self.bias += ledger.bias;
         for (sum, n) in self.connections.iter_mut().zip(ledger.connections) {
             *sum += n;
         }
@@ -154,18 +195,36 @@ impl Job {
 
     /// Renders until `stop` or until `on_pass`, called after every pass, breaks. Which samples a pass
     /// takes depends on the clock, but the sums they end up in do not: the film after n samples per
-    /// pixel is the same bit for bit, however they were divided into passes and threads.
+    /// pixel is the same bit for bit, however they were divided into passes and threads. While radiosity is
+    /// solved for, `on_pass` sees every step with an empty film; if it breaks then, what is solved until then is
+    /// shown by one sample per pixel.
+    ///
+    /// # Errors
+    /// The integrator needs radiosity, and there is none.
     pub fn render(
         &self,
         stop: Stop,
         mut on_pass: impl FnMut(&Film, &Stats) -> ControlFlow<()>,
-    ) -> (Film, Stats) {
+    ) -> Result<(Film, Stats), RenderError> {
         let start = Instant::now();
         let mut film = self.new_film(stop);
         let mut stats = Stats::default();
         let transport = self.transport(film.replicates());
         stats.phases.setup = start.elapsed().as_secs_f64();
-        while let Some(n) = next_pass(stop, film.spp(), start.elapsed()) {
+        let solved = transport.prepare(&mut |progress| {
+            stats.seconds = start.elapsed().as_secs_f64();
+            stats.solving = Some(SolvingStep {
+                step: progress.step,
+                patches: progress.mesh.len(),
+                residual: progress.residual,
+            });
+            on_pass(&film, &stats)
+        });
+        stats.phases.radiosity = solved.map_err(RenderError::Radiosity)?;
+        stats.solving = None;
+        stats.solution = transport.solution_report().cloned();
+        let prepared = start.elapsed();
+        while let Some(n) = next_pass(stop, film.spp(), prepared, start.elapsed()) {
             let pass = self.add_pass(&transport, &mut film, n);
             stats.add(pass);
             stats.seconds = start.elapsed().as_secs_f64();
@@ -173,7 +232,7 @@ impl Job {
                 break;
             }
         }
-        (film, stats)
+        Ok((film, stats))
     }
 
     /// Whether what the integrator keeps beside the film fits into the memory that it may take; if not, what is
@@ -196,14 +255,21 @@ impl Job {
     }
 
     /// Takes the next `n` samples of every pixel, on all threads of the current pool.
-    pub fn add_samples(&self, film: &mut Film, n: u64) -> Stats {
+    ///
+    /// # Errors
+    /// As of [`Job::render`].
+    pub fn add_samples(&self, film: &mut Film, n: u64) -> Result<Stats, RenderError> {
         let start = Instant::now();
         let transport = self.transport(film.replicates());
         let setup = start.elapsed().as_secs_f64();
+        let solved = transport.prepare(&mut |_| ControlFlow::Continue(()));
+        let radiosity = solved.map_err(RenderError::Radiosity)?;
         let mut stats = self.add_pass(&transport, film, n);
         stats.phases.setup = setup;
-        stats.seconds += setup;
-        stats
+        stats.phases.radiosity = radiosity;
+        stats.solution = transport.solution_report().cloned();
+        stats.seconds += setup + radiosity;
+        Ok(stats)
     }
 
     fn add_pass(&self, transport: &Transport, film: &mut Film, n: u64) -> Stats {
@@ -324,6 +390,7 @@ impl Pass<'_> {
                     let (transport, iteration) = (self.transport, self.iteration);
                     let mut li = transport.sample(iteration, &at, ray, &sampler, &mut ledger);
                     li.radiance *= seen.weight;
+                    ledger.settle(seen.weight * weight);
                     let radiance = li.radiance;
                     // Splats are told apart where they arrive.
                     let mut parts = PerTechnique::default();
@@ -357,15 +424,16 @@ impl Pass<'_> {
     }
 }
 
-/// Samples per pixel of the next pass; `None` to stop.
-fn next_pass(stop: Stop, done: u64, elapsed: Duration) -> Option<u64> {
+/// Samples per pixel of the next pass; `None` to stop. `elapsed` counts from the start, and the first sample was
+/// begun when it was `prepared`.
+fn next_pass(stop: Stop, done: u64, prepared: Duration, elapsed: Duration) -> Option<u64> {
     if done == 0 {
         return match stop {
             Stop::Spp(0) => None,
             _ => Some(1),
         };
     }
-    let per_sample = elapsed.as_secs_f64() / done as f64;
+    let per_sample = elapsed.saturating_sub(prepared).as_secs_f64() / done as f64;
     let affordable = |time: f64| (time / per_sample.max(1e-9)) as u64;
     match stop {
         // At most doubling: the first passes also pay for warming up.

@@ -132,6 +132,11 @@ impl Scene {
         }
     }
 
+    /// All lights, by their ids.
+    pub fn emitters(&self) -> &[Emitter] {
+        self.lights.emitters()
+    }
+
     /// dp/du and dp/dv at a hit, for bump maps; either is zero where it is undefined.
     pub fn dp_duv(&self, hit: &Hit) -> (Vec3, Vec3) {
         self.world.dp_duv(hit)
@@ -295,6 +300,37 @@ impl Scene {
             Err("no surface has a lobe other than delta ones, that a caustic could be seen on")
         } else {
             Ok(())
+        }
+    }
+
+    /// Whether some surface has a diffuse lobe.
+    pub fn is_diffuse(&self) -> bool {
+        self.diffuse_shapes().next().is_some()
+    }
+
+    fn diffuse_shapes(&self) -> impl Iterator<Item = ShapeId> + '_ {
+        let shapes = (0..self.surfaces.len() as u32).map(ShapeId);
+        shapes.filter(|shape| {
+            let material = self.surfaces[shape.0 as usize];
+            let material = self.materials.get(material.0 as usize);
+            material.is_some_and(Material::is_diffuse)
+        })
+    }
+
+    /// Whether there can be diffuse surfaces that see each other, and light on them; if not, why.
+    pub fn exchanges_diffuse_light(&self) -> Result<(), &'static str> {
+        if !self.has_lights() {
+            return Err("there is no emitter");
+        }
+        let mut shapes = self.diffuse_shapes();
+        let (Some(first), second) = (shapes.next(), shapes.next()) else {
+            return Err("no surface reflects diffusely");
+        };
+        let alone = second.is_none() && self.world.placement_of(first).is_none();
+        let geometry = self.world.geometries().get(first.0 as usize);
+        match alone && geometry.is_some_and(Geometry::is_flat) {
+            true => Err("a single flat surface reflects diffusely, which does not light itself"),
+            false => Ok(()),
         }
     }
 

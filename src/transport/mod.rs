@@ -11,6 +11,7 @@ pub mod mis;
 mod path;
 mod photon_mapper;
 pub mod photons;
+pub mod radiosity;
 
 pub use bidir::{BidirSpec, Method};
 pub use combined::{CombinedSpec, Show};
@@ -18,7 +19,9 @@ pub use ledger::{Ledger, PathStats, PerTechnique, Technique};
 pub use path::{DirectSpec, PathSpec};
 pub use photon_mapper::PhotonMapperSpec;
 pub use photons::PhotonSpec;
+pub use radiosity::{Bias, CacheSpec, CachedSpec, Indirect, RadiositySpec, Solved};
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::bsdf::Mode;
@@ -26,6 +29,7 @@ use crate::film::FilmSpec;
 use crate::geom::{Hit, Ray};
 use crate::material::Shading;
 use crate::math::{Rgb, Vec2};
+use crate::radiosity::{Progress, Report, SolveError, SolveSpec};
 use crate::sampler::{Sampler, SamplerKind, dim};
 use crate::scene::{Camera, CameraSample, PlanEntry, Scene};
 
@@ -40,6 +44,10 @@ pub enum IntegratorSpec {
     Combined(CombinedSpec),
     /// Photon maps behind a final gather.
     PhotonMapper(PhotonMapperSpec),
+    /// Path tracing, light between diffuse surfaces from a cache.
+    Cached(CachedSpec),
+    /// Radiosity shown.
+    Radiosity(RadiositySpec),
 }
 
 impl IntegratorSpec {
@@ -50,6 +58,8 @@ impl IntegratorSpec {
             IntegratorSpec::Bidirectional(spec) => spec.method.name(),
             IntegratorSpec::Combined(_) => "combined",
             IntegratorSpec::PhotonMapper(_) => "photonmapper",
+            IntegratorSpec::Cached(_) => "path",
+            IntegratorSpec::Radiosity(_) => "radiosity",
         }
     }
 
@@ -61,6 +71,8 @@ impl IntegratorSpec {
             IntegratorSpec::Bidirectional(spec) => &mut spec.hide_emitters,
             IntegratorSpec::Combined(spec) => &mut spec.path.hide_emitters,
             IntegratorSpec::PhotonMapper(spec) => &mut spec.path.hide_emitters,
+            IntegratorSpec::Cached(spec) => &mut spec.path.hide_emitters,
+            IntegratorSpec::Radiosity(spec) => &mut spec.path.hide_emitters,
         }
     }
 
@@ -72,6 +84,8 @@ impl IntegratorSpec {
             IntegratorSpec::Bidirectional(spec) => Some(&mut spec.max_depth),
             IntegratorSpec::Combined(spec) => Some(&mut spec.path.max_depth),
             IntegratorSpec::PhotonMapper(spec) => Some(&mut spec.path.max_depth),
+            IntegratorSpec::Cached(spec) => Some(&mut spec.path.max_depth),
+            IntegratorSpec::Radiosity(spec) => Some(&mut spec.path.max_depth),
         }
     }
 
@@ -83,6 +97,8 @@ impl IntegratorSpec {
             IntegratorSpec::Bidirectional(spec) => Some(&mut spec.rr_depth),
             IntegratorSpec::Combined(spec) => Some(&mut spec.path.rr_depth),
             IntegratorSpec::PhotonMapper(spec) => Some(&mut spec.path.rr_depth),
+            IntegratorSpec::Cached(spec) => Some(&mut spec.path.rr_depth),
+            IntegratorSpec::Radiosity(spec) => Some(&mut spec.path.rr_depth),
         }
     }
 
@@ -91,19 +107,64 @@ impl IntegratorSpec {
         match self {
             IntegratorSpec::Path(_)
             | IntegratorSpec::Direct(_)
+            | IntegratorSpec::Cached(_)
+            | IntegratorSpec::Radiosity(_)
             | IntegratorSpec::PhotonMapper(_) => None,
             IntegratorSpec::Bidirectional(spec) => Some(&mut spec.photons),
             IntegratorSpec::Combined(spec) => Some(&mut spec.photons),
         }
     }
 
-    /// What the estimator decides on in `scene`, for the plan.
-    pub fn plan(&self, scene: &Scene) -> Option<PlanEntry> {
+    /// How radiosity is solved for, in estimators that do.
+    pub fn solve(&mut self) -> Option<&mut SolveSpec> {
         match self {
-            IntegratorSpec::Bidirectional(spec) => Some(spec.plan(scene)),
-            IntegratorSpec::Combined(spec) => Some(spec.plan(scene)),
-            IntegratorSpec::PhotonMapper(spec) => Some(spec.plan(scene)),
+            IntegratorSpec::Combined(spec) => Some(&mut spec.cache.solve),
+            IntegratorSpec::Cached(spec) => Some(&mut spec.cache.solve),
+            IntegratorSpec::Radiosity(spec) => Some(&mut spec.solve),
             _ => None,
+        }
+    }
+
+    /// What is made of the light between diffuse surfaces, in path tracers: these can all use a cache of it.
+    pub fn cache(&self) -> Option<CacheSpec> {
+        match self {
+            IntegratorSpec::Path(_) => Some(CacheSpec::default()),
+            IntegratorSpec::Cached(spec) => Some(spec.cache.clone()),
+            IntegratorSpec::Combined(spec) => Some(spec.cache.clone()),
+            _ => None,
+        }
+    }
+
+    /// The same path tracer with another cache; other estimators stay as they are.
+    pub fn with_cache(self, cache: CacheSpec) -> IntegratorSpec {
+        match self {
+            IntegratorSpec::Path(path) | IntegratorSpec::Cached(CachedSpec { path, .. }) => {
+                match cache.indirect {
+                    Indirect::None => IntegratorSpec::Path(path),
+                    _ => IntegratorSpec::Cached(CachedSpec { path, cache }),
+                }
+            }
+            IntegratorSpec::Combined(spec) => {
+                IntegratorSpec::Combined(CombinedSpec { cache, ..spec })
+            }
+            other => other,
+        }
+    }
+
+    /// What the estimator decides on in `scene`, for the plan.
+    pub fn plan(&self, scene: &Scene) -> Vec<PlanEntry> {
+        match self {
+            IntegratorSpec::Bidirectional(spec) => vec![spec.plan(scene)],
+            IntegratorSpec::Combined(spec) => {
+                let cache = spec.cache.plan(scene, &spec.path);
+                [spec.plan(scene)].into_iter().chain(cache).collect()
+            }
+            IntegratorSpec::PhotonMapper(spec) => vec![spec.plan(scene)],
+            IntegratorSpec::Cached(spec) => {
+                spec.cache.plan(scene, &spec.path).into_iter().collect()
+            }
+            IntegratorSpec::Radiosity(spec) => vec![spec.plan(scene)],
+            IntegratorSpec::Path(_) | IntegratorSpec::Direct(_) => Vec::new(),
         }
     }
 
@@ -123,8 +184,11 @@ impl IntegratorSpec {
         match self {
             IntegratorSpec::Path(_) | IntegratorSpec::Direct(_) => false,
             IntegratorSpec::Bidirectional(spec) => spec.method.merges(),
-            IntegratorSpec::Combined(spec) => spec.show != Show::AllByPath,
-            IntegratorSpec::PhotonMapper(_) => true,
+            IntegratorSpec::Combined(spec) => {
+                spec.show != Show::AllByPath || spec.cache.indirect == Indirect::Gather
+            }
+            IntegratorSpec::Cached(spec) => spec.cache.indirect == Indirect::Gather,
+            IntegratorSpec::PhotonMapper(_) | IntegratorSpec::Radiosity(_) => true,
         }
     }
 }
@@ -167,6 +231,8 @@ enum Work<'a> {
     Bidirectional(bidir::Engine<'a>),
     Combined(combined::Combined<'a>),
     PhotonMapper(photon_mapper::PhotonMapper<'a>),
+    Cached(radiosity::CachedPath<'a>),
+    Radiosity(radiosity::View<'a>),
 }
 
 /// What all samples of one iteration share. A function of scene, seed and the iteration's number alone.
@@ -190,13 +256,43 @@ impl<'a> Transport<'a> {
             }
             IntegratorSpec::Combined(spec) => match spec.shoots(setting.scene) {
                 true => Work::Combined(combined::Combined::new(spec, setting)),
-                false => Work::Path(&spec.path),
+                false => with_cache(&spec.path, &spec.cache, setting),
             },
+            IntegratorSpec::Cached(spec) => with_cache(&spec.path, &spec.cache, setting),
+            IntegratorSpec::Radiosity(spec) => Work::Radiosity(radiosity::View::new(spec, setting)),
             IntegratorSpec::PhotonMapper(spec) => {
                 Work::PhotonMapper(photon_mapper::PhotonMapper::new(spec, setting))
             }
         };
         Transport { setting, work }
+    }
+
+    /// Solves for radiosity, if that is asked for and not done yet, on all threads of the current pool; `observe`
+    /// sees every step and may stop the work. Seconds on the clock.
+    ///
+    /// # Errors
+    /// Why the scene has no solution. Without this call, [`Transport::begin`] solves, and where that fails walks
+    /// find all light by themselves.
+    pub fn prepare(
+        &self,
+        observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<f64, SolveError> {
+        self.solving()
+            .map_or(Ok(0.0), |solving| solving.prepare(observe))
+    }
+
+    /// What the solution is known to be; `None` where there is none.
+    pub fn solution_report(&self) -> Option<&Report> {
+        self.solving()?.report()
+    }
+
+    fn solving(&self) -> Option<&radiosity::Solving<'a>> {
+        match &self.work {
+            Work::Combined(engine) => engine.solving.as_ref(),
+            Work::Cached(engine) => Some(&engine.solving),
+            Work::Radiosity(engine) => engine.solving.as_ref(),
+            _ => None,
+        }
     }
 
     /// Whether the photons of the integrator fit into the memory that they may take; if not, what is wrong.
@@ -205,7 +301,7 @@ impl<'a> Transport<'a> {
             Work::Combined(engine) => engine.fits(),
             Work::PhotonMapper(engine) => engine.fits(),
             Work::Bidirectional(engine) => engine.fits(),
-            Work::Path(_) | Work::Direct(_) => Ok(()),
+            Work::Path(_) | Work::Direct(_) | Work::Cached(_) | Work::Radiosity(_) => Ok(()),
         }
     }
 
@@ -213,7 +309,7 @@ impl<'a> Transport<'a> {
     /// all over the picture.
     pub fn iterates(&self) -> bool {
         match &self.work {
-            Work::Path(_) | Work::Direct(_) => false,
+            Work::Path(_) | Work::Direct(_) | Work::Cached(_) | Work::Radiosity(_) => false,
             Work::Bidirectional(_) | Work::Combined(_) => true,
             Work::PhotonMapper(engine) => engine.iterates(),
         }
@@ -226,13 +322,18 @@ impl<'a> Transport<'a> {
             Work::Bidirectional(engine) => Some(engine.radius(number)).filter(|r| *r > 0.0),
             Work::Combined(engine) => Some(engine.radius(number)),
             Work::Path(_) | Work::Direct(_) | Work::PhotonMapper(_) => None,
+            Work::Cached(_) | Work::Radiosity(_) => None,
         }
     }
 
     /// Begins the iteration of sample `number`, on all threads of the current pool.
     pub fn begin(&self, number: u64, ledger: &mut Ledger) -> Iteration {
+        // What went wrong is known to who asked for it.
+        let _ = self.prepare(&mut |_| ControlFlow::Continue(()));
         match &self.work {
-            Work::Path(_) | Work::Direct(_) => Iteration::default(),
+            Work::Path(_) | Work::Direct(_) | Work::Cached(_) | Work::Radiosity(_) => {
+                Iteration::default()
+            }
             Work::Bidirectional(engine) => engine.begin(number, ledger),
             Work::Combined(engine) => engine.begin(number, ledger),
             Work::PhotonMapper(engine) => engine.begin(number, ledger),
@@ -257,7 +358,19 @@ impl<'a> Transport<'a> {
             Work::Bidirectional(engine) => engine.sample(iteration, at, ray, sampler, ledger),
             Work::Combined(engine) => engine.sample(iteration, ray, sampler, ledger),
             Work::PhotonMapper(engine) => engine.sample(iteration, ray, sampler, ledger),
+            Work::Cached(engine) => engine.sample(ray, sampler, ledger),
+            Work::Radiosity(engine) => engine.sample(ray, sampler, ledger),
         }
+    }
+}
+
+/// The path tracer, with a cache if there is anything to read from it.
+fn with_cache<'a>(path: &'a PathSpec, cache: &'a CacheSpec, setting: Setting<'a>) -> Work<'a> {
+    match cache.is_used(setting.scene, path) {
+        Ok(()) if cache.indirect == Indirect::Gather => {
+            Work::Cached(radiosity::CachedPath::new(path, cache, setting))
+        }
+        _ => Work::Path(path),
     }
 }
 

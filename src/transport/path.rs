@@ -120,6 +120,11 @@ pub(super) enum Gathered {
     Also(Rgb),
     /// All radiance that lobes other than delta ones send towards the walk: delta lobes alone lead on.
     Instead(Rgb),
+    /// Of it, what does not come straight from an emitter. The walk samples emitters, and then delta lobes alone lead
+    /// on.
+    Reflected(Rgb),
+    /// All radiance that the diffuse lobe sends towards the walk: the others lead on.
+    Diffuse(Rgb),
 }
 
 /// A vertex of the walk with a lobe that is not a delta one.
@@ -270,7 +275,7 @@ impl PathSpec {
                 false => sampler.independent(),
             };
             let mut numbers = VertexNumbers::new(&sampler, depth);
-            let shading = scene.shade(&hit, numbers.material(scene));
+            let mut shading = scene.shade(&hit, numbers.material(scene));
             if let Bsdf::Null(passed) = shading.bsdf {
                 // The surface is not there, but counts as an edge: what is chosen at the last vertex is
                 // still under way.
@@ -287,6 +292,48 @@ impl PathSpec {
             let any_choice = roulette || scene.lights_are_chosen() || shading.bsdf.has_lobes();
             let u = numbers.draw(any_choice);
             let mut settled = false;
+            let lit = !shading.bsdf.is_delta() && scene.has_lights();
+            if lit {
+                let vertex = Vertex {
+                    hit: &hit,
+                    shading: &shading,
+                    edges: depth + 1,
+                    sampler: &sampler,
+                    throughput,
+                };
+                let mut connected = !gather.alone();
+                let mut mis = Mis::Power {
+                    bsdf_per_light: gather.bsdf_share(&vertex),
+                };
+                match gather.at(&vertex, stats) {
+                    Gathered::Nothing => {}
+                    Gathered::Also(found) => lo += throughput * found,
+                    Gathered::Instead(found) => {
+                        lo += throughput * found;
+                        settled = true;
+                        connected = false;
+                    }
+                    Gathered::Reflected(found) => {
+                        lo += throughput * found;
+                        settled = true;
+                        // No walk will meet the emitter instead.
+                        mis = Mis::LightOnly;
+                    }
+                    Gathered::Diffuse(found) => {
+                        lo += throughput * found;
+                        match shading.without_diffuse() {
+                            Some(others) => shading = others,
+                            None => break,
+                        }
+                    }
+                }
+                if connected {
+                    let passes = max_depth - depth - 2;
+                    let connect = Connect { mis, passes };
+                    let lit = direct_light(scene, &hit, &shading, connect, u.pick, u.light, stats);
+                    lo += throughput * lit;
+                }
+            }
             let vertex = Vertex {
                 hit: &hit,
                 shading: &shading,
@@ -294,27 +341,6 @@ impl PathSpec {
                 sampler: &sampler,
                 throughput,
             };
-            let lit = !shading.bsdf.is_delta() && scene.has_lights();
-            if lit {
-                match gather.at(&vertex, stats) {
-                    Gathered::Nothing => {}
-                    Gathered::Also(found) => lo += throughput * found,
-                    Gathered::Instead(found) => {
-                        lo += throughput * found;
-                        settled = true;
-                    }
-                }
-                if !settled && !gather.alone() {
-                    let connect = Connect {
-                        mis: Mis::Power {
-                            bsdf_per_light: gather.bsdf_share(&vertex),
-                        },
-                        passes: max_depth - depth - 2,
-                    };
-                    let lit = direct_light(scene, &hit, &shading, connect, u.pick, u.light, stats);
-                    lo += throughput * lit;
-                }
-            }
             // The last edge could only meet an emitter.
             if depth + 2 >= max_depth && !scene.emitters_can_be_met() {
                 break;

@@ -82,7 +82,7 @@ fn bias_falls_as_theory_says() {
             let mut film = compiled.job.new_film(Stop::Spp(STAGES[STAGES.len() - 1]));
             let mut before = (0, 0.0);
             for (run, n) in runs.iter_mut().zip(STAGES) {
-                let stats = compiled.job.add_samples(&mut film, n - before.0);
+                let stats = compiled.job.add_samples(&mut film, n - before.0).unwrap();
                 assert_eq!(stats.invalid.count, 0);
                 let sum = render::mean_of(&film.mean()) * n as f64;
                 run.add((sum - before.1) / (n - before.0) as f64);

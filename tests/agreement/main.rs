@@ -52,6 +52,7 @@ pub fn combined(max_depth: u32, photons: PhotonSpec) -> IntegratorSpec {
         path: path(max_depth),
         photons,
         show: Show::All,
+        ..CombinedSpec::default()
     })
 }
 

@@ -22,7 +22,8 @@ pub fn compile_with(xml: &str, overrides: &Overrides) -> Compiled {
 pub fn render(compiled: &Compiled, spp: u64) -> (Film, Stats) {
     let (film, stats) = compiled
         .job
-        .render(Stop::Spp(spp), |_, _| ControlFlow::Continue(()));
+        .render(Stop::Spp(spp), |_, _| ControlFlow::Continue(()))
+        .unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(stats.invalid.count, 0, "{:?}", stats.invalid);
     (film, stats)
 }

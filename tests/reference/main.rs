@@ -43,7 +43,8 @@ fn render_as(
     change(&mut compiled.job.integrator);
     let (film, stats) = compiled
         .job
-        .render(Stop::Spp(spp), |_, _| ControlFlow::Continue(()));
+        .render(Stop::Spp(spp), |_, _| ControlFlow::Continue(()))
+        .unwrap();
     assert_eq!(stats.invalid.count, 0, "{file}: {:?}", stats.invalid);
     let window = film.window();
     let picture = |values: Vec<[f64; 3]>| Picture {

@@ -116,3 +116,72 @@ command line:1:14: the integrator "ptracer" cannot connect light to the sensor "
   help: use "bdpt", "vcm" or "path", which also walk from the sensor"#,
     );
 }
+
+#[test]
+fn radiosity_without_use_or_effect() {
+    says(
+        of("<integrator type='path'><string name='indirect' value='guide'/></integrator>"),
+        r#"
+a.xml:3:57: walks that radiosity guides are not supported
+  <integrator type='path'><string name='indirect' value='guide'/></integrator>
+                                                         ^
+  help: use "gather", which reads radiosity, or "none""#,
+    );
+    says(
+        of("<integrator type='path'><string name='solver' value='gauss'/></integrator>"),
+        r#"
+a.xml:3:55: "solver" has no effect without radiosity
+  <integrator type='path'><string name='solver' value='gauss'/></integrator>
+                                                       ^
+  help: leave it out, or set "indirect" to "gather""#,
+    );
+    says(
+        of(
+            "<integrator type='radiosity'><string name='solver' value='gauss'/><float name='error' value='1'/></integrator>",
+        ),
+        r#"
+a.xml:3:93: "error" has no effect with the solver "gauss"
+  <integrator type='radiosity'><string name='solver' value='gauss'/><float name='error' value='1'/></integrator>
+                                                                                              ^
+  help: leave it out, or use the solver "hierarchical""#,
+    );
+    says(
+        of("<integrator type='radiosity'><integer name='resolution' value='64'/></integrator>"),
+        r#"
+a.xml:3:65: "resolution" has no effect with form factors by "analytic"
+  <integrator type='radiosity'><integer name='resolution' value='64'/></integrator>
+                                                                 ^
+  help: use "samples""#,
+    );
+    says(
+        of("<integrator type='radiosity'><string name='show' value='smooth'/></integrator>"),
+        r#"
+a.xml:3:58: "show" must be one of "flat", "gouraud", "gather", not "smooth"
+  <integrator type='radiosity'><string name='show' value='smooth'/></integrator>
+                                                          ^"#,
+    );
+    let asking = |integrator: Option<&str>, indirect: &str| {
+        let asked = Overrides {
+            integrator: integrator.map(str::to_string),
+            indirect: Some(indirect.to_string()),
+            ..Overrides::default()
+        };
+        building_in(Path::new("nowhere"), "<sensor type='perspective'/>", &asked)
+    };
+    says(
+        asking(Some("bdpt"), "gather"),
+        r#"
+command line:1:12: the integrator "bdpt" finds indirect light in its own way
+  --indirect gather
+             ^
+  help: leave --indirect out, or give --integrator path or combined"#,
+    );
+    says(
+        asking(None, "gahter"),
+        r#"
+command line:1:12: unknown way "gahter" to find indirect light
+  --indirect gahter
+             ^
+  help: did you mean "gather"?"#,
+    );
+}

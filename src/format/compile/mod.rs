@@ -26,6 +26,8 @@ use world::Layout;
 pub struct Overrides {
     /// Name of an integrator.
     pub integrator: Option<String>,
+    /// What a path tracer makes of light between diffuse surfaces: `none`, `gather`, `guide`.
+    pub indirect: Option<String>,
     /// Name of a sampler.
     pub sampler: Option<String>,
     /// Longest path in edges; -1 sets no limit.
@@ -98,7 +100,7 @@ pub fn compile(desc: &SceneDesc, overrides: &Overrides) -> Result<Compiled, Scen
     let materials = materials.finish(&mut plan, &mut warnings);
     desc.check_all_read()?;
     let mut scene = Scene::with_world(world, surfaces, materials, lights, center, plan);
-    if let Some(entry) = integrator.plan(&scene) {
+    for entry in integrator.plan(&scene) {
         scene.decide(entry);
     }
     let job = Job {

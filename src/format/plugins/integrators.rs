@@ -81,6 +81,88 @@ const SAMPLE_DIRECT: Param = Param::bool(
     true,
     "Connect vertices to emitters by points made for them; only true.",
 );
+const INDIRECT: Param = Param::choice(
+    "indirect",
+    &["none", "gather", "guide"],
+    "none",
+    "Light between diffuse surfaces: none, walks find it; gather, read from radiosity where a walk meets a second diffuse surface (biased); luxel only.",
+);
+const SOLVER: Param = Param::choice(
+    "solver",
+    &[
+        "gauss",
+        "gauss-seidel",
+        "jacobi",
+        "shooting",
+        "hierarchical",
+    ],
+    "hierarchical",
+    "How radiosity is solved for; this and what follows have an effect only where it is.",
+);
+const FORM_FACTORS: Param = Param::choice(
+    "form_factors",
+    &["hemicube", "montecarlo", "analytic"],
+    "analytic",
+    "How the share of light that goes from patch to patch is found.",
+);
+const RESOLUTION: Param = Param::int(
+    "resolution",
+    (2, 4096),
+    128,
+    "Pixels along the edge of a hemicube.",
+);
+const SAMPLES_PER_PAIR: Param = Param::int(
+    "samples",
+    (1, 1 << 20),
+    16,
+    "Rays between two patches, for form factors by montecarlo or analytic.",
+);
+const PATCH_SIZE: Param = Param::optional(
+    "patch_size",
+    Kind::Float(Range::Positive),
+    "Longest edge of a patch in scene units; without it, a part of the scene.",
+);
+const MIN_SIZE: Param = Param::optional(
+    "min_size",
+    Kind::Float(Range::Positive),
+    "Shortest edge that the solver hierarchical makes, in scene units; without it, a part of the scene.",
+);
+const ERROR: Param = Param::float(
+    "error",
+    Range::Positive,
+    1e-5,
+    "Greatest error of a link of the solver hierarchical, as a share of the power that the scene emits.",
+);
+const RESIDUAL: Param = Param::float(
+    "residual",
+    Range::Positive,
+    1e-4,
+    "Residual relative to the emitted power at which solving ends.",
+);
+const MAX_STEPS: Param = Param::int(
+    "max_steps",
+    (-1, 1 << 40),
+    -1,
+    "Most steps of solving: sweeps, or patches that shoot; -1: as many as the residual takes.",
+);
+const CURVE_ERROR: Param = Param::float(
+    "curve_error",
+    Range::Open(0.0, 0.3),
+    0.02,
+    "Greatest distance of patches from curved shapes, as a share of their radius.",
+);
+const MAX_PATCHES: Param = Param::int(
+    "max_patches",
+    (1, u32::MAX as i64 - 1),
+    4_000_000,
+    "Most patches; more are an error.",
+);
+const SHOW: Param = Param::choice(
+    "show",
+    &["flat", "gouraud", "gather"],
+    "gather",
+    "Patches as they are, interpolated, or a final gather: light sent to the point that is seen.",
+);
 const INTEGRATORS: &[Slot] = &[Slot::new(Category::Integrator, 0, usize::MAX)];
 
 const fn integrator(name: &'static str, params: &'static [Param], doc: &'static str) -> Plugin {
@@ -190,7 +272,26 @@ const PHOTON_MAPPER: &[Param] = &[
 pub const PLUGINS: &[Plugin] = &[
     integrator(
         "path",
-        &[MAX_DEPTH, RR_DEPTH, HIDE, PER_PASS, TIMEOUT, BLOCK],
+        &[
+            MAX_DEPTH,
+            RR_DEPTH,
+            HIDE,
+            INDIRECT,
+            SOLVER,
+            FORM_FACTORS,
+            RESOLUTION,
+            SAMPLES_PER_PAIR,
+            PATCH_SIZE,
+            MIN_SIZE,
+            ERROR,
+            RESIDUAL,
+            MAX_STEPS,
+            CURVE_ERROR,
+            MAX_PATCHES,
+            PER_PASS,
+            TIMEOUT,
+            BLOCK,
+        ],
         "Path tracing with next-event estimation and multiple importance sampling.",
     ),
     integrator(
@@ -204,6 +305,18 @@ pub const PLUGINS: &[Plugin] = &[
             MAX_DEPTH,
             RR_DEPTH,
             HIDE,
+            INDIRECT,
+            SOLVER,
+            FORM_FACTORS,
+            RESOLUTION,
+            SAMPLES_PER_PAIR,
+            PATCH_SIZE,
+            MIN_SIZE,
+            ERROR,
+            RESIDUAL,
+            MAX_STEPS,
+            CURVE_ERROR,
+            MAX_PATCHES,
             PHOTON_COUNT,
             INITIAL_RADIUS,
             ALPHA,
@@ -213,6 +326,30 @@ pub const PLUGINS: &[Plugin] = &[
             BLOCK,
         ],
         "Path tracing that leaves caustics to photons; biased by their radius, which shrinks; luxel only.",
+    ),
+    integrator(
+        "radiosity",
+        &[
+            SHOW,
+            SOLVER,
+            FORM_FACTORS,
+            RESOLUTION,
+            SAMPLES_PER_PAIR,
+            PATCH_SIZE,
+            MIN_SIZE,
+            ERROR,
+            RESIDUAL,
+            MAX_STEPS,
+            CURVE_ERROR,
+            MAX_PATCHES,
+            MAX_DEPTH,
+            RR_DEPTH,
+            HIDE,
+            PER_PASS,
+            TIMEOUT,
+            BLOCK,
+        ],
+        "Radiosity: light between diffuse surfaces by patches, with mirrors, glass and gloss by walks on top of it; biased by the size of patches; luxel only.",
     ),
     integrator(
         "bdpt",

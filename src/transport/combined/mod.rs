@@ -19,18 +19,18 @@
 
 mod caustics;
 
-pub(super) use caustics::{Caustics, caustic};
+pub(super) use caustics::{Caustics, Gathering, caustic};
 
 use super::light_walk::LightWalk;
 use super::mis::Techniques;
 use super::path::{Start, UNBOUNDED};
 use super::photons::{self, Kernel, KernelShape, PhotonMap, Shoot};
-use super::{Iteration, Ledger, Li, PathSpec, PhotonSpec, Setting, Technique};
+use super::radiosity::{Cache, Reader, Reads, Solving};
+use super::{CacheSpec, Indirect, Iteration, Ledger, Li, PathSpec, PhotonSpec, Setting, Technique};
 use crate::geom::Ray;
 use crate::light::Aim;
 use crate::sampler::Sampler;
 use crate::scene::{PlanEntry, Scene};
-use caustics::Gathering;
 
 /// Who finds caustics, and what else is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,6 +51,8 @@ pub struct CombinedSpec {
     pub path: PathSpec,
     pub photons: PhotonSpec,
     pub show: Show,
+    /// Of the light between diffuse surfaces; read only where all light is shown.
+    pub cache: CacheSpec,
 }
 
 impl Default for CombinedSpec {
@@ -59,6 +61,7 @@ impl Default for CombinedSpec {
             path: PathSpec::default(),
             photons: PhotonSpec::default(),
             show: Show::All,
+            cache: CacheSpec::default(),
         }
     }
 }
@@ -110,6 +113,8 @@ pub struct Combined<'a> {
     count: u64,
     /// Of the first iteration.
     radius: f32,
+    /// `None` where no cache is read.
+    pub solving: Option<Solving<'a>>,
 }
 
 impl<'a> Combined<'a> {
@@ -120,9 +125,15 @@ impl<'a> Combined<'a> {
             Some(radius) => radius,
             None => RADIUS_IN_PIXELS * photons::footprint(&setting),
         };
+        let cache = &spec.cache;
+        let used = spec.show == Show::All
+            && cache.indirect == Indirect::Gather
+            && cache.is_used(setting.scene, &spec.path).is_ok();
         Combined {
             spec,
             setting,
+            solving: used
+                .then(|| Solving::new(setting.scene, &cache.solve, cache.given.as_ref(), true)),
             aim: setting.scene.aim_at_caustics(),
             count: spec.photons.count.unwrap_or(pixels),
             radius,
@@ -190,6 +201,9 @@ impl<'a> Combined<'a> {
         ledger: &mut Ledger,
     ) -> Li {
         let path = &self.spec.path;
+        if let Some(cache) = self.solving.as_ref().and_then(Solving::get) {
+            return self.sample_cached(cache, iteration, ray, sampler, ledger);
+        }
         let mut gathering = Gathering {
             caustics: iteration.caustics.as_ref(),
             max_depth: path.max_depth.unwrap_or(UNBOUNDED),
@@ -200,6 +214,27 @@ impl<'a> Combined<'a> {
         let li = path.walk(scene, start, sampler, &mut ledger.rays, &mut gathering);
         ledger.record(Technique::Merging, gathering.found);
         ledger.record(Technique::Path, li.radiance - gathering.found);
+        li
+    }
+
+    /// The same with a cache of light between diffuse surfaces.
+    #[inline]
+    fn sample_cached(
+        &self,
+        cache: &Cache,
+        iteration: &Iteration,
+        ray: Ray,
+        sampler: &Sampler,
+        ledger: &mut Ledger,
+    ) -> Li {
+        let (scene, path) = (self.setting.scene, &self.spec.path);
+        let mut reader = Reader::<true>::new(scene, path, Some(cache), Reads::ReflectedBehind);
+        reader.caustics = iteration.caustics.as_ref();
+        let start = Start::at_camera(ray);
+        let li = path.walk(scene, start, sampler, &mut ledger.rays, &mut reader);
+        ledger.fresh_bias = reader.bias;
+        ledger.record(Technique::Merging, reader.found);
+        ledger.record(Technique::Path, li.radiance - reader.found);
         li
     }
 }

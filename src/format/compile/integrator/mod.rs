@@ -3,6 +3,7 @@
 mod bidir;
 mod layers;
 mod photons;
+mod radiosity;
 
 pub use bidir::check_camera;
 pub use photons::check_memory;
@@ -12,9 +13,11 @@ use crate::format::plugins::Category;
 use crate::format::{Overrides, Props, SceneError};
 use crate::render::AovLayer;
 use crate::transport::aov::Aov;
-use crate::transport::{CombinedSpec, DirectSpec, IntegratorSpec, PathSpec, PhotonMapperSpec};
+use crate::transport::{
+    CacheSpec, CombinedSpec, DirectSpec, IntegratorSpec, PathSpec, PhotonMapperSpec, RadiositySpec,
+};
 
-const NAMES: [&str; 8] = [
+const NAMES: [&str; 9] = [
     "path",
     "direct",
     "bdpt",
@@ -23,6 +26,7 @@ const NAMES: [&str; 8] = [
     "sppm",
     "combined",
     "photonmapper",
+    "radiosity",
 ];
 
 pub fn integrator(
@@ -39,6 +43,7 @@ pub fn integrator(
         Some(name) => replaced(spec, name)?,
         None => spec,
     };
+    spec = radiosity::overridden(spec, overrides)?;
     if let Some(depth) = overrides.max_depth {
         let name = spec.name();
         let Some(limit) = spec.max_depth() else {
@@ -66,7 +71,11 @@ fn unwrap(props: &Props, found: &mut Vec<AovLayer>) -> Result<Option<IntegratorS
     }
     let hide_emitters = props.bool("hide_emitters")?;
     match props.plugin() {
-        "path" => Ok(Some(IntegratorSpec::Path(path(props, hide_emitters)?))),
+        "path" => {
+            let spec = IntegratorSpec::Path(path(props, hide_emitters)?);
+            Ok(Some(spec.with_cache(radiosity::cache(props)?)))
+        }
+        "radiosity" => radiosity::shown(props, path(props, hide_emitters)?).map(Some),
         "combined" => Ok(Some(IntegratorSpec::Combined(photons::combined(
             props,
             path(props, hide_emitters)?,
@@ -146,6 +155,7 @@ fn replaced(mut spec: IntegratorSpec, name: &str) -> Result<IntegratorSpec, Scen
         "path" => IntegratorSpec::Path(PathSpec::default()),
         "combined" => IntegratorSpec::Combined(CombinedSpec::default()),
         "photonmapper" => IntegratorSpec::PhotonMapper(PhotonMapperSpec::default()),
+        "radiosity" => IntegratorSpec::Radiosity(RadiositySpec::default()),
         "direct" => IntegratorSpec::Direct(DirectSpec {
             emitter_samples: 1,
             bsdf_samples: 1,
@@ -169,6 +179,12 @@ fn replaced(mut spec: IntegratorSpec, name: &str) -> Result<IntegratorSpec, Scen
     }
     if let (Some(to), Some(from)) = (new.photons(), spec.photons()) {
         *to = from.clone();
+    }
+    if let Some(solve) = spec.solve().cloned() {
+        match new.cache() {
+            Some(cache) => new = new.with_cache(CacheSpec { solve, ..cache }),
+            None => new.solve().into_iter().for_each(|to| *to = solve.clone()),
+        }
     }
     Ok(new)
 }

@@ -34,6 +34,7 @@ pub fn combined(props: &Props, path: PathSpec) -> Result<CombinedSpec, SceneErro
             true => Show::All,
             false => Show::AllByPath,
         },
+        cache: super::radiosity::cache(props)?,
     })
 }
 

@@ -1,0 +1,157 @@
+//! Radiosity: how it is solved for, shown, and used by path tracers.
+
+use crate::format::compile::{on_command_line, suggest};
+use crate::format::{Overrides, Props, SceneError};
+use crate::radiosity::{FormFactorMethod, SolveSpec, Solver};
+use crate::transport::radiosity::{Indirect, Show};
+use crate::transport::{CacheSpec, IntegratorSpec, PathSpec, RadiositySpec};
+
+/// Parameters that only a solution needs.
+const SOLVING: [&str; 11] = [
+    "solver",
+    "form_factors",
+    "resolution",
+    "samples",
+    "patch_size",
+    "min_size",
+    "error",
+    "residual",
+    "max_steps",
+    "curve_error",
+    "max_patches",
+];
+
+/// How radiosity is solved for, from the parameters that all integrators with a use of it share.
+pub fn solve(props: &Props) -> Result<SolveSpec, SceneError> {
+    let defaults = SolveSpec::default();
+    let solver = props.string("solver")?;
+    let solver = Solver::ALL.into_iter().find(|s| s.name() == solver);
+    let solver = solver.unwrap_or(defaults.solver);
+    let optional = |name: &str| match props.is_given(name) {
+        true => props.float(name).map(Some),
+        false => Ok(None),
+    };
+    if solver != Solver::Hierarchical {
+        for name in ["min_size", "error"] {
+            if props.is_given(name) {
+                let what = format!(
+                    "\"{name}\" has no effect with the solver \"{}\"",
+                    solver.name()
+                );
+                let help = "leave it out, or use the solver \"hierarchical\"";
+                return Err(props.error_at(name, what).with_help(help));
+            }
+        }
+    }
+    let max_steps = u64::try_from(props.int("max_steps")?).ok();
+    Ok(SolveSpec {
+        solver,
+        form_factors: form_factors(props)?,
+        patch_size: optional("patch_size")?,
+        min_size: optional("min_size")?,
+        error: props.float("error")?,
+        residual: props.float("residual")?,
+        max_steps,
+        curve_error: props.float("curve_error")?,
+        max_patches: props.int("max_patches")? as u64,
+        ..defaults
+    })
+}
+
+fn form_factors(props: &Props) -> Result<FormFactorMethod, SceneError> {
+    let method = props.string("form_factors")?;
+    let (method, used, unused) = match method {
+        "hemicube" => {
+            let resolution = props.int("resolution")? as u32;
+            (
+                FormFactorMethod::Hemicube { resolution },
+                "resolution",
+                "samples",
+            )
+        }
+        other => {
+            let samples = props.int("samples")? as u32;
+            let method = match other {
+                "montecarlo" => FormFactorMethod::MonteCarlo { samples },
+                _ => FormFactorMethod::Analytic { samples },
+            };
+            (method, "samples", "resolution")
+        }
+    };
+    if props.is_given(unused) {
+        let name = method.name();
+        let what = format!("\"{unused}\" has no effect with form factors by \"{name}\"");
+        let help = format!("use \"{used}\"");
+        return Err(props.error_at(unused, what).with_help(help));
+    }
+    props.ignore(&[unused]);
+    Ok(method)
+}
+
+/// The integrator "radiosity".
+pub fn shown(props: &Props, path: PathSpec) -> Result<IntegratorSpec, SceneError> {
+    let show = props.string("show")?;
+    let show = Show::ALL.into_iter().find(|d| d.name() == show);
+    Ok(IntegratorSpec::Radiosity(RadiositySpec {
+        path,
+        solve: solve(props)?,
+        show: show.unwrap_or_default(),
+        given: None,
+    }))
+}
+
+/// The use that a path tracer makes of radiosity.
+pub fn cache(props: &Props) -> Result<CacheSpec, SceneError> {
+    let name = props.string("indirect")?;
+    let indirect = Indirect::ALL.into_iter().find(|i| i.name() == name);
+    let indirect = indirect.unwrap_or_default();
+    if indirect == Indirect::Guide {
+        return Err(props.error_at("indirect", NO_GUIDE).with_help(INSTEAD));
+    }
+    if indirect == Indirect::None {
+        if let Some(name) = SOLVING.into_iter().find(|name| props.is_given(name)) {
+            let what = format!("\"{name}\" has no effect without radiosity");
+            let help = "leave it out, or set \"indirect\" to \"gather\"";
+            return Err(props.error_at(name, what).with_help(help));
+        }
+        props.ignore(&SOLVING);
+        return Ok(CacheSpec::default());
+    }
+    Ok(CacheSpec {
+        indirect,
+        solve: solve(props)?,
+        given: None,
+    })
+}
+
+/// `spec` with what the command line wants of light between diffuse surfaces.
+pub fn overridden(
+    spec: IntegratorSpec,
+    overrides: &Overrides,
+) -> Result<IntegratorSpec, SceneError> {
+    let Some(name) = &overrides.indirect else {
+        return Ok(spec);
+    };
+    let error = |what: String| on_command_line("--indirect", name, what);
+    let Some(indirect) = Indirect::ALL.into_iter().find(|i| i.name() == name) else {
+        let help = suggest(name, Indirect::ALL.map(Indirect::name));
+        return Err(
+            error(format!("unknown way \"{name}\" to find indirect light")).with_help(help),
+        );
+    };
+    if indirect == Indirect::Guide {
+        return Err(error(NO_GUIDE.to_string()).with_help(INSTEAD));
+    }
+    match spec.cache() {
+        Some(cache) => Ok(spec.with_cache(CacheSpec { indirect, ..cache })),
+        None => {
+            let name = spec.name();
+            let what = format!("the integrator \"{name}\" finds indirect light in its own way");
+            let help = "leave --indirect out, or give --integrator path or combined";
+            Err(error(what).with_help(help))
+        }
+    }
+}
+
+const NO_GUIDE: &str = "walks that radiosity guides are not supported";
+const INSTEAD: &str = "use \"gather\", which reads radiosity, or \"none\"";

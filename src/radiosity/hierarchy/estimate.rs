@@ -1,0 +1,291 @@
+//! How much light a link carries: form factor, visibility, and how both differ over the receiver.
+
+use super::tree::{Kind, NONE, Tree, TreeNode};
+use crate::geom::{Endpoint, Hit};
+use crate::math::{DVec2, DVec3};
+use crate::radiosity::mesh::on_facet;
+use crate::radiosity::polygon::point_to_polygon;
+use crate::radiosity::{Outline, Piece};
+use crate::sampler::mix;
+use crate::scene::Scene;
+use std::f64::consts::PI;
+
+/// What is known of a pair of nodes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// Mean over the receiver, visibility included.
+    pub form_factor: f64,
+    /// How far it differs over the receiver.
+    pub spread: f64,
+    /// Share of rays that arrive.
+    pub visible: f64,
+}
+
+/// Pairs of points of clusters that a ray is traced between.
+const CLUSTER_RAYS: usize = 12;
+/// Pairs that are tried to find so many that face each other.
+const CLUSTER_TRIES: usize = 64;
+/// What is not known of the light of a cluster by its low frequencies alone, as a share.
+const SMOOTHED: f64 = 0.1;
+
+/// Whether no point of `a` can see one of `b` from its front.
+fn behind(a: &TreeNode, b: &TreeNode) -> bool {
+    let (Kind::Surface { piece, .. }, Kind::Surface { piece: other, .. }) = (a.kind, b.kind) else {
+        return false;
+    };
+    // As flat as coordinates in f32 can say.
+    let slack = 1e-6 * (a.radius + b.radius);
+    let is_behind = |of: &TreeNode, piece: &Piece, other: &Piece| {
+        other
+            .corners()
+            .all(|c| (c - piece.o).dot(of.normal) <= slack)
+    };
+    is_behind(a, &piece, &other) || is_behind(b, &other, &piece)
+}
+
+/// The pair of receiver `r` and sender `s`; `None` where neither can see the other. `fine` takes more rays.
+pub fn estimate(scene: &Scene, tree: &Tree, r: u32, s: u32, fine: bool) -> Option<Estimate> {
+    let (receiver, sender) = (&tree.nodes[r as usize], &tree.nodes[s as usize]);
+    match (receiver.kind, sender.kind) {
+        (
+            Kind::Surface {
+                facet: rf,
+                piece: rp,
+            },
+            Kind::Surface {
+                facet: sf,
+                piece: sp,
+            },
+        ) => {
+            if behind(receiver, sender) {
+                return None;
+            }
+            let look = |facet, piece: Piece| {
+                move |st: DVec2| on_facet(scene, &tree.surfaces, facet, &piece, st)
+            };
+            let numbers = Numbers::new(r, s);
+            Some(between_surfaces(
+                scene,
+                (receiver, &rp, &look(rf, rp)),
+                (&sp, &look(sf, sp)),
+                numbers,
+                if fine { 4 } else { 1 },
+            ))
+        }
+        _ => between_clusters(scene, tree, r, s),
+    }
+}
+
+/// Unoccluded form factors at the middles of the receiver's quarters, and rays to the sender from each.
+fn between_surfaces(
+    scene: &Scene,
+    (receiver, rp, at_receiver): (&TreeNode, &Piece, &dyn Fn(DVec2) -> Hit),
+    (sp, at_sender): (&Piece, &dyn Fn(DVec2) -> Hit),
+    mut numbers: Numbers,
+    rays: usize,
+) -> Estimate {
+    let free = |p: DVec3| point_to_polygon(p, receiver.normal, sp.corners());
+    let mut factors = [0.0; 4];
+    for (quarter, f) in factors.iter_mut().enumerate() {
+        *f = free(rp.child(quarter).center());
+    }
+    if factors == [0.0; 4] {
+        // The sender is seen from an edge at most.
+        let corners = rp.corners().map(|c| c.lerp(receiver.center, 0.05));
+        let most = corners.map(free).fold(0.0, f64::max);
+        return Estimate {
+            form_factor: 0.0,
+            spread: most,
+            visible: 1.0,
+        };
+    }
+    let ends: [Hit; 4] =
+        std::array::from_fn(|i| at_sender(in_quarter(sp.outline, i, &mut numbers)));
+    let (mut arrived, mut sent) = (0.0, 0.0);
+    let mut seen = [None; 4];
+    for (i, seen) in seen.iter_mut().enumerate() {
+        let hit = at_receiver(in_quarter(rp.outline, i, &mut numbers));
+        *seen = visibility(scene, &hit, &ends, i, rays);
+    }
+    // Where no pair of points faces each other, as elsewhere.
+    let known = seen.iter().flatten().count().max(1) as f64;
+    let elsewhere = match seen.iter().all(Option::is_none) {
+        true => 1.0,
+        false => seen.iter().flatten().sum::<f64>() / known,
+    };
+    for (f, seen) in factors.iter_mut().zip(seen) {
+        sent += *f;
+        *f *= seen.unwrap_or(elsewhere);
+        arrived += *f;
+    }
+    let least = factors.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = factors.iter().copied().fold(0.0, f64::max);
+    Estimate {
+        form_factor: 0.25 * factors.iter().sum::<f64>(),
+        spread: most - least,
+        visible: arrived / sent,
+    }
+}
+
+/// Share of the light of `ends` that arrives at `hit`, by `rays` of them, from number `first` on; `None` where they
+/// do not face each other.
+fn visibility(scene: &Scene, hit: &Hit, ends: &[Hit; 4], first: usize, rays: usize) -> Option<f64> {
+    let (mut arrived, mut sent, mut traced) = (0.0, 0.0, 0);
+    for j in 0..4 {
+        let end = &ends[(first + j) % 4];
+        let d = (end.p - hit.p).as_dvec3();
+        let d2 = d.length_squared();
+        // The piece shows its front to where the hits look.
+        let facing = |n: &Hit, d: DVec3| d.dot(n.ng.as_dvec3()) * n.ng.dot(n.wo).signum() as f64;
+        let (ca, cb) = (facing(hit, d), facing(end, -d));
+        if !(ca > 0.0 && cb > 0.0 && d2 > 0.0) {
+            continue;
+        }
+        let weight = (ca / d2) * (cb / d2);
+        sent += weight;
+        if !blocked(scene, hit, &Endpoint::from(end)) {
+            arrived += weight;
+        }
+        traced += 1;
+        if traced == rays {
+            break;
+        }
+    }
+    (sent > 0.0).then(|| arrived / sent)
+}
+
+fn blocked(scene: &Scene, from: &Hit, to: &Endpoint) -> bool {
+    let ray = from.spawn_to(to);
+    !(ray.t_max > 0.0) || scene.transmittance(&ray, PASSES) < 0.5
+}
+
+/// Surfaces that a ray may pass through.
+const PASSES: u32 = 8;
+
+/// Random pairs of points, those that face each other with a ray between.
+fn between_clusters(scene: &Scene, tree: &Tree, r: u32, s: u32) -> Option<Estimate> {
+    let (receiver, sender) = (&tree.nodes[r as usize], &tree.nodes[s as usize]);
+    let mut numbers = Numbers::new(r, s);
+    let (mut free, mut arrived, mut most) = (0.0, 0.0, 0.0f64);
+    let (mut facing, mut tries) = (0, 0);
+    while tries < CLUSTER_TRIES && facing < CLUSTER_RAYS {
+        tries += 1;
+        let (a, b) = (tree.point(r, &mut numbers), tree.point(s, &mut numbers));
+        let kernel = kernel(&a, &b, sender.area);
+        if kernel <= 0.0 {
+            continue;
+        }
+        facing += 1;
+        free += kernel;
+        most = most.max(kernel);
+        let hit = |at: &Point| on_facet(scene, &tree.surfaces, at.facet, &at.piece, at.st);
+        if !blocked(scene, &hit(&a), &Endpoint::from(&hit(&b))) {
+            arrived += kernel;
+        }
+    }
+    if free == 0.0 {
+        return None;
+    }
+    let visible: f64 = arrived / free;
+    let distance = receiver.center.distance(sender.center);
+    let apart = distance - receiver.radius - sender.radius;
+    let (form_factor, mean) = (arrived / tries as f64, free / facing as f64);
+    // Light of a cluster is evaluated for each surface by its direction and distance: what errs is the size of
+    // both, and that visibility is one number.
+    let spread = match apart > 0.0 {
+        true => {
+            let size = (receiver.radius + sender.radius) / distance;
+            mean * (2.0 * visible.min(1.0 - visible) + visible * (size.min(1.0) + SMOOTHED))
+        }
+        false => most.max(visible),
+    };
+    Some(Estimate {
+        form_factor: form_factor.min(1.0),
+        spread: spread.min(1.0),
+        visible,
+    })
+}
+
+/// A point of a surface below some node.
+pub struct Point {
+    facet: u32,
+    piece: Piece,
+    st: DVec2,
+    p: DVec3,
+    n: DVec3,
+}
+
+/// Form factor of a sender of `area` like at `b` for a receiver at `a`.
+fn kernel(a: &Point, b: &Point, area: f64) -> f64 {
+    let d = b.p - a.p;
+    let d2 = d.length_squared();
+    let (ca, cb) = (d.dot(a.n), -d.dot(b.n));
+    if !(ca > 0.0 && cb > 0.0 && d2 > 0.0) {
+        return 0.0;
+    }
+    // Each cosine is d · n over the distance.
+    (area * (ca / d2) * (cb / d2) / PI).min(1.0)
+}
+
+impl Tree {
+    /// A point below `node`, uniform over the area.
+    fn point(&self, mut node: u32, numbers: &mut Numbers) -> Point {
+        loop {
+            let n = &self.nodes[node as usize];
+            match n.kind {
+                Kind::Surface { facet, piece } => {
+                    let st = piece.outline.sample(numbers.two());
+                    return Point {
+                        facet,
+                        piece,
+                        st,
+                        p: piece.at(st),
+                        n: n.normal,
+                    };
+                }
+                Kind::Cluster { .. } => {
+                    let mut left = numbers.one() * n.area;
+                    let mut chosen = NONE;
+                    for child in self.children(node) {
+                        chosen = child;
+                        left -= self.nodes[child as usize].area;
+                        if left < 0.0 {
+                            break;
+                        }
+                    }
+                    node = chosen;
+                }
+            }
+        }
+    }
+}
+
+/// A random place in quarter `i` of a piece.
+fn in_quarter(outline: Outline, i: usize, numbers: &mut Numbers) -> DVec2 {
+    let unit = Piece {
+        o: DVec3::ZERO,
+        e1: DVec3::X,
+        e2: DVec3::Y,
+        outline,
+    };
+    let p = unit.child(i).at(outline.sample(numbers.two()));
+    outline.clamp(DVec2::new(p.x, p.y))
+}
+
+/// Random numbers of a pair of nodes: the same whenever they are asked for.
+struct Numbers(u64);
+
+impl Numbers {
+    fn new(r: u32, s: u32) -> Numbers {
+        Numbers(mix((u64::from(r) << 32) | u64::from(s)))
+    }
+
+    fn one(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        (mix(self.0) >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
+    }
+
+    fn two(&mut self) -> DVec2 {
+        DVec2::new(self.one(), self.one())
+    }
+}

@@ -1,0 +1,148 @@
+//! Hierarchical radiosity: light is exchanged between pieces of surface as large as the error allows.
+//!
+//! Nodes are clusters of facets, facets, and quarters of quarters of these; leaves are the patches. A link brings
+//! light from a sending node to a receiving one; each pair of points of two patches belongs to exactly one link
+//! between ancestors of theirs (Hanrahan, Salzman & Aupperle 1991; clusters as in Smits, Arvo & Greenberg 1994).
+//!
+//! A link is as good as needed when the error of the power that it brings is below a threshold: the spread of the
+//! form factor, visibility included, over the receiver, times what is sent; and the spread of radiosity over the
+//! sender, times the form factor. Otherwise one of its ends is divided. The threshold falls in steps from a loose
+//! one to the one that is asked for, with solutions between, so that links are judged by the light that there is.
+
+mod cluster;
+mod estimate;
+mod gather;
+mod output;
+mod refine;
+mod tree;
+
+use super::{Progress, Report, Rgb64, Solution, SolveError, SolveSpec, Surfaces};
+use crate::scene::Scene;
+use gather::Field;
+use refine::Refiner;
+use std::ops::{ControlFlow, Range};
+use std::sync::Arc;
+use std::time::Instant;
+use tree::Tree;
+
+/// A cluster or a piece of surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Node {
+    /// `u32::MAX` for the root.
+    pub parent: u32,
+    /// The patches below, which are numbered depth first: an ancestor's range contains those of its descendants.
+    pub patches: Range<u32>,
+    /// Into `Hierarchy::links`: those that bring light here, by rising first patch of their senders.
+    pub links: Range<u32>,
+}
+
+/// Light on its way from one node to another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Link {
+    /// The node that it comes from.
+    pub sender: u32,
+    /// From the receiver to the sender, with visibility: times the sender's radiosity it is irradiance in W/m².
+    pub form_factor: f32,
+}
+
+/// What light was exchanged between. The parent of a node has a smaller number than the node.
+#[derive(Clone, Debug)]
+pub struct Hierarchy {
+    pub nodes: Vec<Node>,
+    pub links: Vec<Link>,
+    /// By patch: the node that it is.
+    pub leaf: Vec<u32>,
+}
+
+/// The thresholds fall by this factor from one refinement to the next.
+const STEP: f64 = 4.0;
+/// Refinements before the last, at most.
+const LOOSER: i32 = 4;
+/// Irradiance that is no more than this share of the mean is not resolved better than that.
+const BLACK: f64 = 1e-3;
+/// Gathering steps after the last refinement, at most, when no other limit is given.
+const MAX_STEPS: u64 = 10_000;
+
+/// The hierarchical solution of `scene`.
+pub fn solve(
+    scene: &Scene,
+    surfaces: Arc<Surfaces>,
+    spec: &SolveSpec,
+    observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<Solution, SolveError> {
+    let start = Instant::now();
+    let mut tree = Tree::new(scene, surfaces.clone(), spec)?;
+    let mut report = Report {
+        mesh_seconds: start.elapsed().as_secs_f64(),
+        ..Report::default()
+    };
+    let mut refiner = Refiner::new(scene, &surfaces, spec, &mut tree);
+    let emitted = tree.emitted_power();
+    let mut field = Field::new(&tree);
+    let most = spec.max_steps.unwrap_or(MAX_STEPS);
+    let mut stopped = false;
+    for looser in (0..=LOOSER).rev() {
+        let clock = Instant::now();
+        let error = spec.error * STEP.powi(looser);
+        // What few links make dark may be brighter than it seems.
+        let black = (BLACK * STEP.powi(looser)).min(0.25);
+        refiner.refine(&mut tree, &mut field, error, black);
+        report.form_factor_seconds += clock.elapsed().as_secs_f64();
+        let clock = Instant::now();
+        // Before the last refinement, it is enough to see where light goes.
+        let wanted = match looser {
+            0 => spec.residual,
+            _ => spec.residual.max(0.02),
+        };
+        loop {
+            report.residual = field.step(&tree) / emitted.element_sum().max(f64::MIN_POSITIVE);
+            report.steps += 1;
+            report.converged = looser == 0 && report.residual <= wanted;
+            let growing = !report.residual.is_finite();
+            if report.residual <= wanted || report.steps >= most || growing {
+                break;
+            }
+        }
+        report.solve_seconds += clock.elapsed().as_secs_f64();
+        if looser == 0 || report.steps >= most {
+            break;
+        }
+        if observes(&tree, &field, &report, observe).is_break() {
+            stopped = true;
+            break;
+        }
+    }
+    report.links = tree.links();
+    let _ = stopped;
+    let solution = output::solution(&tree, &field, report);
+    if solution.mesh.is_empty() {
+        return Err(SolveError::NoPatches);
+    }
+    let last = Progress {
+        step: solution.report.steps,
+        mesh: &solution.mesh,
+        radiosity: &solution.radiosity,
+        ambient: Rgb64::ZERO,
+        residual: solution.report.residual,
+    };
+    let _ = observe(&last);
+    Ok(solution)
+}
+
+/// Shows the state between two refinements.
+fn observes(
+    tree: &Tree,
+    field: &Field,
+    report: &Report,
+    observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+) -> ControlFlow<()> {
+    let (mesh, numbers) = output::mesh(tree);
+    let radiosity = output::by_patch(tree, &numbers, &field.radiosity);
+    observe(&Progress {
+        step: report.steps,
+        mesh: &mesh,
+        radiosity: &radiosity,
+        ambient: Rgb64::ZERO,
+        residual: report.residual,
+    })
+}

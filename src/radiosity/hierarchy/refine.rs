@@ -1,0 +1,303 @@
+//! Which nodes are linked.
+
+use super::estimate::{Estimate, estimate};
+use super::gather::Field;
+use super::tree::{Kind, NONE, Tree, TreeLink};
+use crate::radiosity::lights::Others;
+use crate::radiosity::{Rgb64, SolveSpec, Surfaces};
+use crate::scene::Scene;
+use rayon::prelude::*;
+
+/// Edges of patches are not divided below this share of the size of the scene, unless a size is asked for.
+const MIN_SIZE: f64 = 1.0 / 256.0;
+
+/// Connections to lights that are no patches, per node.
+const CONNECTIONS: u32 = 64;
+
+pub struct Refiner<'a> {
+    scene: &'a Scene,
+    others: Others<'a>,
+    seed: u64,
+    min_size: f64,
+    /// Pairs of receiver and sender that no light goes between yet.
+    dormant: Vec<(u32, u32)>,
+    /// Links that are less good than asked for, since nothing could be divided any more.
+    pub coarse: u64,
+}
+
+/// What becomes of a pair.
+enum Fate {
+    /// Never any light.
+    Dropped,
+    /// No light yet.
+    Dormant,
+    Linked(TreeLink),
+    /// To be replaced by pairs of the parts of one of them.
+    Divided {
+        sender: bool,
+    },
+}
+
+impl<'a> Refiner<'a> {
+    /// Also finds the light that comes from lights that are no patches.
+    pub fn new(
+        scene: &'a Scene,
+        surfaces: &'a Surfaces,
+        spec: &SolveSpec,
+        tree: &mut Tree,
+    ) -> Refiner<'a> {
+        let size = 2.0 * tree.nodes[0].radius;
+        let refiner = Refiner {
+            scene,
+            others: Others::new(scene, surfaces),
+            seed: spec.seed,
+            min_size: spec.min_size.unwrap_or(size * MIN_SIZE),
+            dormant: vec![(0, 0)],
+            coarse: 0,
+        };
+        let cells = tree.cells.clone();
+        refiner.light(tree, &cells);
+        refiner
+    }
+
+    /// Finds the irradiance of surfaces from lights that are no patches.
+    fn light(&self, tree: &mut Tree, nodes: &[u32]) {
+        if self.others.is_empty() {
+            return;
+        }
+        let find = |&node: &u32| match tree.nodes[node as usize].kind {
+            Kind::Surface { facet, piece } => {
+                let number = u64::from(node);
+                self.others
+                    .irradiance(facet, &piece, CONNECTIONS, number, self.seed)
+            }
+            Kind::Cluster { .. } => Rgb64::ZERO,
+        };
+        let found: Vec<Rgb64> = nodes.par_iter().map(find).collect();
+        for (node, found) in nodes.iter().zip(found) {
+            tree.nodes[*node as usize].external = found;
+        }
+    }
+
+    /// Divides surfaces over which the light of lights that are no patches differs too much.
+    fn refine_external(&self, tree: &mut Tree, field: &mut Field, threshold: f64) {
+        if self.others.is_empty() {
+            return;
+        }
+        let mut nodes: Vec<u32> = tree.cells.clone();
+        while !nodes.is_empty() {
+            // Divided, then looked at: whether it was worth it shows in the quarters.
+            let large = |&&node: &&u32| {
+                let arriving = tree.nodes[node as usize].external.max_element();
+                weight(tree, field, node) * arriving > threshold
+            };
+            let large: Vec<u32> = nodes.iter().filter(large).copied().collect();
+            let mut next = Vec::new();
+            for node in large {
+                let known = !tree.children(node).is_empty();
+                if !tree.divide(self.scene, node, self.min_size) {
+                    continue;
+                }
+                field.grow(tree);
+                let quarters: Vec<u32> = tree.children(node).collect();
+                if !known {
+                    self.light(tree, &quarters);
+                }
+                next.extend(quarters);
+            }
+            // Only where quarters differ by more than chance makes them.
+            let differs = |&node: &u32| {
+                let n = &tree.nodes[node as usize];
+                let mean = tree.nodes[n.parent as usize].external;
+                let difference = (n.external - mean).max_element().abs();
+                let chance = 2.0 * mean.max_element() / f64::from(CONNECTIONS).sqrt();
+                weight(tree, field, node) * difference > threshold && difference > chance
+            };
+            next.retain(differs);
+            nodes = next;
+        }
+    }
+
+    /// Links all pairs of nodes so that no link errs by more than `threshold` (see [`errors`]), judged by the light
+    /// of `field`; what is darker than `black`, as a share of the mean, is no better than that.
+    pub fn refine(&mut self, tree: &mut Tree, field: &mut Field, threshold: f64, black: f64) {
+        self.coarse = 0;
+        field.judge_by(tree, black);
+        self.refine_external(tree, field, threshold);
+        let mut pairs = std::mem::take(&mut self.dormant);
+        pairs.extend(self.reconsidered(tree, field, threshold));
+        while !pairs.is_empty() {
+            let judge = |&(r, s): &(u32, u32)| self.judge(tree, field, r, s, threshold);
+            let fates: Vec<Fate> = pairs.par_iter().map(judge).collect();
+            let mut next = Vec::new();
+            for ((r, s), fate) in pairs.into_iter().zip(fates) {
+                match fate {
+                    Fate::Dropped => {}
+                    Fate::Dormant => self.dormant.push((r, s)),
+                    Fate::Linked(link) => tree.nodes[r as usize].links.push(link),
+                    Fate::Divided { sender } => {
+                        self.divide(tree, field, (r, s), sender, &mut next);
+                    }
+                }
+            }
+            pairs = next;
+        }
+    }
+
+    /// Takes out the links that are not good enough any more, as pairs to be divided.
+    fn reconsidered(&mut self, tree: &mut Tree, field: &Field, threshold: f64) -> Vec<(u32, u32)> {
+        let mut pairs = Vec::new();
+        for r in 0..tree.nodes.len() as u32 {
+            let mut links = std::mem::take(&mut tree.nodes[r as usize].links);
+            links.retain(|link| {
+                let found = Estimate {
+                    form_factor: f64::from(link.form_factor),
+                    spread: f64::from(link.spread),
+                    visible: f64::from(link.visible),
+                };
+                let [spread, varied] = errors(tree, field, r, link.sender, &found);
+                let good = spread + varied <= threshold
+                    || !self.divisible(tree, r, link.sender, spread < varied);
+                if !good {
+                    pairs.push((r, link.sender));
+                }
+                good
+            });
+            tree.nodes[r as usize].links = links;
+        }
+        pairs
+    }
+
+    fn judge(&self, tree: &Tree, field: &Field, r: u32, s: u32, threshold: f64) -> Fate {
+        let sent = field.radiosity[s as usize].max_element();
+        let receiver = &tree.nodes[r as usize];
+        if r == s && !receiver.is_cluster() {
+            return Fate::Dropped;
+        }
+        if sent <= 0.0 {
+            return Fate::Dormant;
+        }
+        // No form factor is larger than 1.
+        let most = weight(tree, field, r) * sent;
+        if r == s && most > threshold {
+            return Fate::Divided { sender: false };
+        }
+        let fine = most > threshold;
+        let Some(found) = estimate(self.scene, tree, r, s, fine) else {
+            return Fate::Dropped;
+        };
+        let [spread, varied] = errors(tree, field, r, s, &found);
+        let by_sender = self.by_sender(tree, r, s, spread < varied);
+        if spread + varied > threshold && self.divisible(tree, r, s, by_sender) {
+            return Fate::Divided { sender: by_sender };
+        }
+        Fate::Linked(TreeLink {
+            sender: s,
+            form_factor: found.form_factor as f32,
+            spread: found.spread as f32,
+            visible: found.visible as f32,
+        })
+    }
+
+    /// Whether the sender is to be divided rather than the receiver.
+    fn by_sender(&self, tree: &Tree, r: u32, s: u32, varied: bool) -> bool {
+        let (receiver, sender) = (&tree.nodes[r as usize], &tree.nodes[s as usize]);
+        match (receiver.is_cluster(), sender.is_cluster()) {
+            (false, false) => varied,
+            _ if sender.radius != receiver.radius => sender.radius > receiver.radius,
+            (_, sender_is_cluster) => sender_is_cluster,
+        }
+    }
+
+    /// Whether one of both can be divided: that which is wanted, or else the other where that is a cluster.
+    fn divisible(&self, tree: &Tree, r: u32, s: u32, by_sender: bool) -> bool {
+        let can = |node: u32| self.can_be_divided(tree, node);
+        let (wanted, other) = if by_sender { (s, r) } else { (r, s) };
+        can(wanted) || (tree.nodes[other as usize].is_cluster())
+    }
+
+    fn can_be_divided(&self, tree: &Tree, node: u32) -> bool {
+        let n = &tree.nodes[node as usize];
+        match n.kind {
+            Kind::Cluster { .. } => true,
+            Kind::Surface { .. } if n.quarters != NONE => true,
+            Kind::Surface { piece, .. } => {
+                piece.longest_edge() >= 2.0 * self.min_size && tree.patches + 3 <= tree.max_patches
+            }
+        }
+    }
+
+    /// Replaces a pair by pairs of the parts of one of its nodes.
+    fn divide(
+        &mut self,
+        tree: &mut Tree,
+        field: &mut Field,
+        (r, s): (u32, u32),
+        sender: bool,
+        next: &mut Vec<(u32, u32)>,
+    ) {
+        if r == s {
+            for a in tree.children(r) {
+                next.extend(tree.children(r).map(|b| (a, b)));
+            }
+            return;
+        }
+        let by_sender = match sender {
+            true => self.can_be_divided(tree, s),
+            false => !self.can_be_divided(tree, r),
+        };
+        let node = if by_sender { s } else { r };
+        if !tree.divide(self.scene, node, self.min_size) {
+            // Patches ran out while the pairs were looked at.
+            self.coarse += 1;
+            if let Some(found) = estimate(self.scene, tree, r, s, true) {
+                tree.nodes[r as usize].links.push(TreeLink {
+                    sender: s,
+                    form_factor: found.form_factor as f32,
+                    spread: found.spread as f32,
+                    visible: found.visible as f32,
+                });
+            }
+            return;
+        }
+        if tree.nodes.len() > field.radiosity.len() {
+            field.grow(tree);
+            let quarters: Vec<u32> = tree.children(node).collect();
+            self.light(tree, &quarters);
+        }
+        for child in tree.children(node) {
+            next.push(if by_sender { (r, child) } else { (child, s) });
+        }
+    }
+}
+
+/// What an error of the irradiance of node `r` in W/m² counts: its share of what arrives there usually, times the
+/// node's share of all area, times its reflectance in proportion to the scene's. So dark corners are as good as
+/// bright ones, and large surfaces better than small ones.
+fn weight(tree: &Tree, field: &Field, r: u32) -> f64 {
+    let (receiver, root) = (&tree.nodes[r as usize], &tree.nodes[0]);
+    let reflectance = receiver.albedo.max_element() / root.albedo.max_element();
+    let weight = receiver.area / root.area * reflectance / field.usual[r as usize];
+    if weight.is_finite() { weight } else { 0.0 }
+}
+
+/// Errors of the light that a link brings, as shares (see [`weight`]): by the spread over the receiver, and by the
+/// differences of radiosity over the sender.
+fn errors(tree: &Tree, field: &Field, r: u32, s: u32, found: &Estimate) -> [f64; 2] {
+    let weight = weight(tree, field, r);
+    let sent = field.radiosity[s as usize].max_element();
+    let quarters = match tree.nodes[s as usize].kind {
+        Kind::Surface { .. } => tree.children(s),
+        Kind::Cluster { .. } => 0..0,
+    };
+    let (mut least, mut most) = (Rgb64::INFINITY, Rgb64::NEG_INFINITY);
+    for quarter in quarters {
+        let b = field.radiosity[quarter as usize];
+        (least, most) = (least.min(b), most.max(b));
+    }
+    let varied = (most - least).max_element().max(0.0);
+    [
+        weight * found.spread * sent,
+        0.5 * weight * found.form_factor * varied,
+    ]
+}

@@ -1,0 +1,213 @@
+//! The nodes: clusters above, facets and their quarters below.
+
+use super::cluster;
+use crate::math::DVec3;
+use crate::radiosity::mesh::{Grid, cells_for, of_piece};
+use crate::radiosity::{Piece, Rgb64, SolveError, SolveSpec, Surfaces};
+use crate::scene::Scene;
+use std::sync::Arc;
+
+pub const NONE: u32 = u32::MAX;
+
+/// What a node is.
+#[derive(Clone, Copy, Debug)]
+pub enum Kind {
+    /// Nodes `first..first + count` are inside.
+    Cluster { first: u32, count: u32 },
+    /// A piece of facet `facet`.
+    Surface { facet: u32, piece: Piece },
+}
+
+#[derive(Clone, Debug)]
+pub struct TreeNode {
+    pub parent: u32,
+    /// The first of four quarters of a divided surface; `NONE` for leaves and clusters.
+    pub quarters: u32,
+    pub kind: Kind,
+    /// Of all surfaces below, in squared scene units.
+    pub area: f64,
+    /// Middle and radius of a sphere around all of it.
+    pub center: DVec3,
+    pub radius: f64,
+    /// Unit normal of a surface; zero for clusters.
+    pub normal: DVec3,
+    /// Means over the area.
+    pub albedo: Rgb64,
+    pub emission: Rgb64,
+    /// Irradiance from lights that are no patches, in W/m².
+    pub external: Rgb64,
+    pub links: Vec<TreeLink>,
+}
+
+/// Light that comes to a node.
+#[derive(Clone, Copy, Debug)]
+pub struct TreeLink {
+    pub sender: u32,
+    /// With visibility.
+    pub form_factor: f32,
+    /// Difference of the largest and the smallest form factor over the receiver, with visibility.
+    pub spread: f32,
+    /// Share of rays that arrive.
+    pub visible: f32,
+}
+
+pub struct Tree {
+    pub surfaces: Arc<Surfaces>,
+    /// By facet: its cells, which are surface nodes without a surface as their parent, in a row.
+    pub grids: Vec<Grid>,
+    /// By number of cell: its node.
+    pub cells: Vec<u32>,
+    /// Clusters come before what they contain; quarters after all that was there when they were made.
+    pub nodes: Vec<TreeNode>,
+    /// Numbers of the clusters among each other, by node; `NONE` for cells.
+    pub clusters: Vec<u32>,
+    /// The nodes that are clusters.
+    pub by_cluster: Vec<u32>,
+    pub patches: u64,
+    pub max_patches: u64,
+}
+
+impl Tree {
+    pub fn new(
+        scene: &Scene,
+        surfaces: Arc<Surfaces>,
+        spec: &SolveSpec,
+    ) -> Result<Tree, SolveError> {
+        let size = spec.patch_size.unwrap_or(f64::INFINITY);
+        let mut grids = Vec::new();
+        let mut pieces = Vec::new();
+        let mut count = 0;
+        for facet in surfaces.facets() {
+            let grid = Grid {
+                n: cells_for(&facet.piece, size),
+                first: count,
+            };
+            let cells = grid.count(facet.piece.outline);
+            if u64::from(count) + u64::from(cells) > spec.max_patches {
+                return Err(SolveError::TooManyPatches {
+                    patches: u64::from(count) + u64::from(cells),
+                    limit: spec.max_patches,
+                });
+            }
+            count += cells;
+            grids.push(grid);
+        }
+        for (i, (facet, grid)) in surfaces.facets().iter().zip(&grids).enumerate() {
+            for cell in 0..grid.count(facet.piece.outline) {
+                pieces.push((i as u32, grid.piece(&facet.piece, cell)));
+            }
+        }
+        use rayon::prelude::*;
+        let make = |&(facet, piece): &(u32, Piece)| {
+            let optics = of_piece(scene, &surfaces, facet, &piece);
+            TreeNode::surface(NONE, facet, piece, optics.albedo, optics.emission)
+        };
+        let roots: Vec<TreeNode> = pieces.par_iter().map(make).collect();
+        let (nodes, cells) = cluster::build(roots);
+        let mut by_cluster = Vec::new();
+        let mut clusters = vec![NONE; nodes.len()];
+        for (i, node) in nodes.iter().enumerate().filter(|(_, n)| n.is_cluster()) {
+            debug_assert!(node.parent == NONE || (node.parent as usize) < i);
+            clusters[i] = by_cluster.len() as u32;
+            by_cluster.push(i as u32);
+        }
+        Ok(Tree {
+            clusters,
+            by_cluster,
+            surfaces,
+            grids,
+            cells,
+            nodes,
+            patches: u64::from(count),
+            max_patches: spec.max_patches,
+        })
+    }
+
+    /// W per channel.
+    pub fn emitted_power(&self) -> Rgb64 {
+        let power = |&cell: &u32| {
+            let n = &self.nodes[cell as usize];
+            (n.emission + n.albedo * n.external) * n.area
+        };
+        self.cells.iter().map(power).sum()
+    }
+
+    pub fn links(&self) -> usize {
+        self.nodes.iter().map(|n| n.links.len()).sum()
+    }
+
+    /// Nodes directly below, if any.
+    pub fn children(&self, node: u32) -> std::ops::Range<u32> {
+        let n = &self.nodes[node as usize];
+        match n.kind {
+            Kind::Cluster { first, count } => first..first + count,
+            Kind::Surface { .. } if n.quarters != NONE => n.quarters..n.quarters + 4,
+            Kind::Surface { .. } => 0..0,
+        }
+    }
+
+    /// Divides a surface that is not divided yet; false where that cannot be done.
+    pub fn divide(&mut self, scene: &Scene, node: u32, min_size: f64) -> bool {
+        let parent = &self.nodes[node as usize];
+        let Kind::Surface { facet, piece } = parent.kind else {
+            return true;
+        };
+        if parent.quarters != NONE {
+            return true;
+        }
+        let fits = self.patches + 3 <= self.max_patches && self.nodes.len() + 4 < NONE as usize;
+        if !fits || piece.longest_edge() < 2.0 * min_size {
+            return false;
+        }
+        let shape = self.surfaces.facets()[facet as usize].shape;
+        let (varies, albedo, emission) = (scene.varies(shape), parent.albedo, parent.emission);
+        let external = parent.external;
+        let first = self.nodes.len() as u32;
+        for quarter in 0..4 {
+            let piece = piece.child(quarter);
+            let (albedo, emission) = match varies {
+                true => {
+                    let optics = of_piece(scene, &self.surfaces, facet, &piece);
+                    (optics.albedo, optics.emission)
+                }
+                false => (albedo, emission),
+            };
+            let mut child = TreeNode::surface(node, facet, piece, albedo, emission);
+            child.external = external;
+            self.nodes.push(child);
+        }
+        self.nodes[node as usize].quarters = first;
+        self.patches += 3;
+        true
+    }
+}
+
+impl TreeNode {
+    pub fn surface(
+        parent: u32,
+        facet: u32,
+        piece: Piece,
+        albedo: Rgb64,
+        emission: Rgb64,
+    ) -> TreeNode {
+        let center = piece.center();
+        let reach = piece.corners().map(|c| c.distance(center));
+        TreeNode {
+            parent,
+            quarters: NONE,
+            kind: Kind::Surface { facet, piece },
+            area: piece.area(),
+            center,
+            radius: reach.fold(0.0, f64::max),
+            normal: piece.normal(),
+            albedo,
+            emission,
+            external: Rgb64::ZERO,
+            links: Vec::new(),
+        }
+    }
+
+    pub fn is_cluster(&self) -> bool {
+        matches!(self.kind, Kind::Cluster { .. })
+    }
+}

@@ -1,0 +1,106 @@
+//! Where the energy of a solution went, and what radiosity leaves out of a scene.
+
+use super::surfaces::Surfaces;
+use super::{PatchMesh, Report, Rgb64, mesh};
+use crate::scene::Scene;
+use rayon::prelude::*;
+
+/// What the balance is made of.
+pub(super) struct Balance<'a> {
+    pub mesh: &'a PatchMesh,
+    /// W/m² per patch: from lights that are no patches, and in all.
+    pub external: &'a [Rgb64],
+    pub irradiance: &'a [Rgb64],
+    /// W.
+    pub escaped: Rgb64,
+}
+
+/// Shares of light below this are not worth a sentence.
+const NEGLIGIBLE: f64 = 1e-3;
+
+/// A report with energies, the share of other scattering and the warnings that these give.
+pub(super) fn of(scene: &Scene, balance: &Balance) -> Report {
+    let patches = &balance.mesh.patches;
+    let mut report = Report {
+        escaped: balance.escaped,
+        ..Report::default()
+    };
+    for ((patch, &external), &irradiance) in
+        patches.iter().zip(balance.external).zip(balance.irradiance)
+    {
+        report.emitted += patch.emission * patch.area;
+        report.external += external * patch.area;
+        report.absorbed += (Rgb64::ONE - patch.albedo) * irradiance * patch.area;
+    }
+    report.other = other(scene, balance);
+    report.warnings = warnings(&balance.mesh.surfaces, &report);
+    report
+}
+
+/// Share of the arriving light that is scattered, but not diffusely.
+fn other(scene: &Scene, balance: &Balance) -> f64 {
+    let mesh = balance.mesh;
+    let scattered = |(patch, &irradiance): (&super::Patch, &Rgb64)| {
+        let optics = mesh::of_piece(scene, &mesh.surfaces, patch.facet, &patch.piece);
+        let arriving = irradiance * patch.area;
+        [
+            (optics.other * arriving).element_sum(),
+            arriving.element_sum(),
+        ]
+    };
+    let parts: Vec<[f64; 2]> = mesh
+        .patches
+        .par_iter()
+        .zip(balance.irradiance)
+        .map(scattered)
+        .collect();
+    let [other, all] = parts
+        .into_iter()
+        .fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+    if all > 0.0 { other / all } else { 0.0 }
+}
+
+/// What the user should know of the scene.
+fn warnings(surfaces: &Surfaces, report: &Report) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let left_out = &surfaces.left_out;
+    let percent = |share: f64| 100.0 * share;
+    if report.other > NEGLIGIBLE {
+        warnings.push(format!(
+            "{:.1} % of the light that arrives at patches is scattered by mirrors, gloss or glass: radiosity \
+             leaves it out",
+            percent(report.other)
+        ));
+    }
+    if left_out.share() > NEGLIGIBLE {
+        warnings.push(format!(
+            "{:.1} % of the area of all surfaces neither reflects diffusely nor shines: it only blocks light",
+            percent(left_out.share())
+        ));
+    }
+    if left_out.moving > 0 {
+        warnings.push(format!(
+            "{} in motion or changing form: no patches are made of them, they block light where they are when the \
+             shutter opens, and reflect none",
+            shapes(left_out.moving)
+        ));
+    }
+    if left_out.formless > 0 {
+        warnings.push(format!(
+            "{} given by grids of distances: no patches are made of them, they block light and reflect none",
+            shapes(left_out.formless)
+        ));
+    }
+    let (external, emitted) = (report.external.element_sum(), report.emitted.element_sum());
+    if external + emitted == 0.0 {
+        warnings.push("no light arrives at any patch".to_string());
+    }
+    warnings
+}
+
+fn shapes(count: u32) -> String {
+    match count {
+        1 => "1 shape".to_string(),
+        n => format!("{n} shapes"),
+    }
+}

@@ -1,0 +1,175 @@
+//! The solution: made once, and read by many threads.
+
+use std::ops::ControlFlow;
+use std::sync::{Arc, OnceLock};
+use std::time::Instant;
+
+use crate::geom::Hit;
+use crate::math::Rgb;
+use crate::radiosity::{self, Display, Progress, Report, Rgb64, Solution, SolveError, SolveSpec};
+use crate::scene::Scene;
+
+/// A solution that is known already. Two are equal if they are the same one.
+#[derive(Clone, Debug)]
+pub struct Solved(pub Arc<Solution>);
+
+impl PartialEq for Solved {
+    fn eq(&self, other: &Solved) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
+
+/// A solution in the form that walks read.
+pub struct Cache {
+    solution: Arc<Solution>,
+    /// Irradiance of each patch in W/m²: all of it, and what diffuse surfaces have reflected before.
+    total: Vec<Rgb>,
+    reflected: Vec<Rgb>,
+    /// The same between vertices; `None` where patches are to be seen.
+    smooth: Option<Smooth>,
+    /// Squared distance from a patch, in scene units, within which its irradiance is too coarse to be seen.
+    near2: Vec<f32>,
+}
+
+/// Irradiance interpolated between the vertices of patches.
+struct Smooth {
+    display: Display,
+    total: Vec<Rgb64>,
+    reflected: Vec<Rgb64>,
+}
+
+/// What is read at a hit.
+pub struct Read {
+    /// In W/m².
+    pub irradiance: Rgb,
+    /// Squared distance from which on that is good enough.
+    pub near2: f32,
+}
+
+impl Cache {
+    /// `smooth`: interpolated between vertices.
+    pub fn new(solution: Arc<Solution>, scene: &Scene, smooth: bool) -> Cache {
+        let diagonal = scene.world().bounds().diagonal().length();
+        let most = (NEAR * diagonal).powi(2);
+        let patches = 0..solution.mesh.len() as u32;
+        let reflected: Vec<Rgb64> = patches.map(|i| solution.indirect(i)).collect();
+        let interpolated = || {
+            let display = Display::new(scene, &solution.mesh);
+            Smooth {
+                total: display.vertex_values(&solution.irradiance),
+                reflected: display.vertex_values(&reflected),
+                display,
+            }
+        };
+        Cache {
+            smooth: smooth.then(interpolated),
+            total: solution.irradiance.iter().map(|e| rgb(*e)).collect(),
+            reflected: reflected.iter().map(|e| rgb(*e)).collect(),
+            near2: (solution.mesh.patches.iter())
+                .map(|p| most.min(p.area as f32))
+                .collect(),
+            solution,
+        }
+    }
+
+    /// All irradiance at `hit`; `None` where the surface has no patch.
+    #[inline]
+    pub fn total(&self, hit: &Hit) -> Option<Read> {
+        self.read(hit, &self.total, |smooth| &smooth.total)
+    }
+
+    /// The same without light straight from emitters.
+    #[inline]
+    pub fn reflected(&self, hit: &Hit) -> Option<Read> {
+        self.read(hit, &self.reflected, |smooth| &smooth.reflected)
+    }
+
+    #[inline]
+    fn read(&self, hit: &Hit, flat: &[Rgb], smooth: fn(&Smooth) -> &[Rgb64]) -> Option<Read> {
+        let mesh = &self.solution.mesh;
+        let at = mesh.locate(hit)?;
+        let patch = at.patch as usize;
+        Some(Read {
+            irradiance: match &self.smooth {
+                Some(by) => rgb(by.display.at(mesh, smooth(by), at)),
+                None => flat[patch],
+            },
+            near2: self.near2[patch],
+        })
+    }
+}
+
+fn rgb(c: Rgb64) -> Rgb {
+    Rgb::from_array(c.to_array().map(|v| v.max(0.0) as f32))
+}
+
+/// A patch is never too coarse from further away than this share of the scene's diagonal, however large it is: it is
+/// only large where its light hardly changes.
+const NEAR: f32 = 0.02;
+
+/// A solution to be made when it is asked for first.
+pub struct Solving<'a> {
+    scene: &'a Scene,
+    spec: &'a SolveSpec,
+    given: Option<&'a Solved>,
+    smooth: bool,
+    made: OnceLock<Result<Option<Cache>, SolveError>>,
+}
+
+impl<'a> Solving<'a> {
+    /// `smooth`: irradiance is to be interpolated within surfaces.
+    pub fn new(
+        scene: &'a Scene,
+        spec: &'a SolveSpec,
+        given: Option<&'a Solved>,
+        smooth: bool,
+    ) -> Solving<'a> {
+        Solving {
+            smooth,
+            scene,
+            spec,
+            given,
+            made: OnceLock::new(),
+        }
+    }
+
+    /// Solves, on all threads of the current pool, unless that is done. `observe` sees every step and may stop the
+    /// work. Seconds that it took on the clock.
+    pub fn prepare(
+        &self,
+        observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<f64, SolveError> {
+        let start = Instant::now();
+        match self.made.get_or_init(|| self.make(observe)) {
+            Ok(_) => Ok(start.elapsed().as_secs_f64()),
+            Err(error) => Err(error.clone()),
+        }
+    }
+
+    fn make(
+        &self,
+        observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<Option<Cache>, SolveError> {
+        let solution = match self.given {
+            Some(Solved(solution)) => Arc::clone(solution),
+            None => match radiosity::solve(self.scene, self.spec, observe) {
+                Ok(solution) => Arc::new(solution),
+                // Nothing to read: walks find all light by themselves.
+                Err(SolveError::NoPatches) => return Ok(None),
+                Err(error) => return Err(error),
+            },
+        };
+        Ok(Some(Cache::new(solution, self.scene, self.smooth)))
+    }
+
+    /// The solution, once [`Solving::prepare`] has made it; `None` where there is nothing to read.
+    #[inline]
+    pub fn get(&self) -> Option<&Cache> {
+        self.made.get()?.as_ref().ok()?.as_ref()
+    }
+
+    /// What the solution is known to be.
+    pub fn report(&self) -> Option<&Report> {
+        self.get().map(|cache| &cache.solution.report)
+    }
+}
