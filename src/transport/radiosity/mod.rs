@@ -50,13 +50,31 @@ impl Indirect {
 }
 
 /// The use that a path tracer makes of radiosity.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct CacheSpec {
     pub indirect: Indirect,
     pub solve: SolveSpec,
     /// What is read, if it is known already.
     pub given: Option<Solved>,
 }
+
+impl Default for CacheSpec {
+    fn default() -> CacheSpec {
+        CacheSpec {
+            indirect: Indirect::None,
+            solve: SolveSpec {
+                error: GATHER_ERROR,
+                ..SolveSpec::default()
+            },
+            given: None,
+        }
+    }
+}
+
+/// Error of a link that is good enough behind a final gather. Measured at 16 samples per pixel: in Mitsuba's Cornell
+/// box the bias of the mean is 0.8 % with 1e-3 and 0.6 % with 1e-4 or 1e-5, which take 4 and 20 times as long; in a
+/// stairwell of 145,000 patches 4.8 %, 4.2 % and 4.1 %, most of it light by gloss and mirrors, at 3 and 8 times.
+const GATHER_ERROR: f64 = 1e-3;
 
 /// Path tracing with radiosity to help it.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -22,8 +22,8 @@ const SOLVING: [&str; 11] = [
 ];
 
 /// How radiosity is solved for, from the parameters that all integrators with a use of it share.
-pub fn solve(props: &Props) -> Result<SolveSpec, SceneError> {
-    let defaults = SolveSpec::default();
+/// What is not given is as in `defaults`.
+pub fn solve(props: &Props, defaults: SolveSpec) -> Result<SolveSpec, SceneError> {
     let solver = props.string("solver")?;
     let solver = Solver::ALL.into_iter().find(|s| s.name() == solver);
     let solver = solver.unwrap_or(defaults.solver);
@@ -49,7 +49,7 @@ pub fn solve(props: &Props) -> Result<SolveSpec, SceneError> {
         form_factors: form_factors(props)?,
         patch_size: optional("patch_size")?,
         min_size: optional("min_size")?,
-        error: props.float("error")?,
+        error: optional("error")?.unwrap_or(defaults.error),
         residual: props.float("residual")?,
         max_steps,
         curve_error: props.float("curve_error")?,
@@ -94,7 +94,7 @@ pub fn shown(props: &Props, path: PathSpec) -> Result<IntegratorSpec, SceneError
     let show = Show::ALL.into_iter().find(|d| d.name() == show);
     Ok(IntegratorSpec::Radiosity(RadiositySpec {
         path,
-        solve: solve(props)?,
+        solve: solve(props, SolveSpec::default())?,
         show: show.unwrap_or_default(),
         given: None,
     }))
@@ -119,7 +119,7 @@ pub fn cache(props: &Props) -> Result<CacheSpec, SceneError> {
     }
     Ok(CacheSpec {
         indirect,
-        solve: solve(props)?,
+        solve: solve(props, CacheSpec::default().solve)?,
         given: None,
     })
 }
