@@ -10,6 +10,7 @@
 
 pub mod display;
 pub mod form_factors;
+pub mod guide;
 pub mod hierarchy;
 pub mod lights;
 pub mod mesh;
@@ -23,6 +24,7 @@ pub mod triangulation;
 
 pub use display::Display;
 pub use form_factors::FormFactors;
+pub use guide::Guide;
 pub use hierarchy::Hierarchy;
 pub use mesh::{Located, Patch, PatchMesh};
 pub use piece::{Outline, Piece};

@@ -11,11 +11,13 @@
 //! is right at all times, and so is all that is seen in mirrors and through glass.
 
 mod gather;
+mod guide;
 mod solved;
 mod view;
 
 pub use gather::Bias;
 pub(super) use gather::{CachedPath, Reader, Reads};
+pub(super) use guide::Guiding;
 pub use solved::Solved;
 pub(super) use solved::{Cache, Solving};
 pub(super) use view::View;
@@ -103,7 +105,23 @@ pub struct RadiositySpec {
 /// is read, the one where it is read, the one that is seen, the eye.
 const CACHED_EDGES: u32 = 4;
 
+/// Greatest error of a link where radiosity guides walks (see [`SolveSpec::error`]).
+pub const GUIDE_ERROR: f64 = 1e-3;
+
 impl CacheSpec {
+    /// What is made of light between diffuse surfaces, with a solution as good as that needs.
+    pub fn of(indirect: Indirect) -> CacheSpec {
+        let mut solve = SolveSpec::default();
+        if indirect == Indirect::Guide {
+            solve.error = GUIDE_ERROR;
+        }
+        CacheSpec {
+            indirect,
+            solve,
+            given: None,
+        }
+    }
+
     /// Whether there is anything to read in `scene` for walks of `path`; if not, why.
     pub fn is_used(&self, scene: &Scene, path: &PathSpec) -> Result<(), &'static str> {
         if self.indirect == Indirect::None {
@@ -122,6 +140,10 @@ impl CacheSpec {
         }
         let (decision, reason) = match self.is_used(scene, path) {
             Err(why) => ("none, nothing is solved", why),
+            Ok(()) if self.indirect == Indirect::Guide => (
+                "solved once, guides walks from diffuse surfaces",
+                "diffuse surfaces light each other",
+            ),
             Ok(()) => (
                 "solved once, read where a walk meets a second diffuse surface",
                 "diffuse surfaces light each other",

@@ -4,9 +4,10 @@ use std::ops::ControlFlow;
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
+use super::{CacheSpec, Indirect};
 use crate::geom::Hit;
 use crate::math::Rgb;
-use crate::radiosity::{self, Progress, Report, Rgb64, Solution, SolveError, SolveSpec};
+use crate::radiosity::{self, Guide, Progress, Report, Rgb64, Solution, SolveError, SolveSpec};
 use crate::scene::Scene;
 
 /// A solution that is known already. Two are equal if they are the same one.
@@ -27,6 +28,8 @@ pub struct Cache {
     reflected: Vec<Rgb>,
     /// Squared distance from a patch, in scene units, within which its irradiance is too coarse to be seen.
     near2: Vec<f32>,
+    /// Where light comes from, if walks are to be guided.
+    pub guide: Option<Guide>,
 }
 
 /// What is read at a hit.
@@ -38,7 +41,7 @@ pub struct Read {
 }
 
 impl Cache {
-    pub fn new(solution: Arc<Solution>, scene: &Scene) -> Cache {
+    pub fn new(solution: Arc<Solution>, scene: &Scene, guides: bool) -> Cache {
         let rgb = |c: Rgb64| Rgb::from_array(c.to_array().map(|v| v.max(0.0) as f32));
         let diagonal = scene.world().bounds().diagonal().length();
         let most = (NEAR * diagonal).powi(2);
@@ -50,6 +53,10 @@ impl Cache {
             near2: (solution.mesh.patches.iter())
                 .map(|p| most.min(p.area as f32))
                 .collect(),
+            guide: match guides {
+                true => Guide::new(scene, Arc::clone(&solution)),
+                false => None,
+            },
             solution,
         }
     }
@@ -85,6 +92,7 @@ pub struct Solving<'a> {
     scene: &'a Scene,
     spec: &'a SolveSpec,
     given: Option<&'a Solved>,
+    guides: bool,
     made: OnceLock<Result<Option<Cache>, SolveError>>,
 }
 
@@ -94,7 +102,16 @@ impl<'a> Solving<'a> {
             scene,
             spec,
             given,
+            guides: false,
             made: OnceLock::new(),
+        }
+    }
+
+    /// What `cache` asks for.
+    pub fn of(scene: &'a Scene, cache: &'a CacheSpec) -> Solving<'a> {
+        Solving {
+            guides: cache.indirect == Indirect::Guide,
+            ..Solving::new(scene, &cache.solve, cache.given.as_ref())
         }
     }
 
@@ -124,7 +141,7 @@ impl<'a> Solving<'a> {
                 Err(error) => return Err(error),
             },
         };
-        Ok(Some(Cache::new(solution, self.scene)))
+        Ok(Some(Cache::new(solution, self.scene, self.guides)))
     }
 
     /// The solution, once [`Solving::prepare`] has made it; `None` where there is nothing to read.
