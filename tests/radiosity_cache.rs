@@ -12,7 +12,7 @@ use luxel::radiosity::{
 };
 use luxel::render::{RenderError, Stats, Stop};
 use luxel::scene::Scene;
-use luxel::transport::radiosity::Display;
+use luxel::transport::radiosity::Show;
 use luxel::transport::{
     CacheSpec, CachedSpec, CombinedSpec, Indirect, IntegratorSpec, PathSpec, RadiositySpec, Solved,
 };
@@ -84,7 +84,7 @@ fn known(scene: &Scene, size: f64, irradiance: f64, direct: f64) -> Solved {
     }))
 }
 
-fn shown(show: Display, given: Option<Solved>) -> IntegratorSpec {
+fn shown(show: Show, given: Option<Solved>) -> IntegratorSpec {
     IntegratorSpec::Radiosity(RadiositySpec {
         show,
         given,
@@ -134,13 +134,15 @@ fn a_furnace_is_the_same_however_its_radiosity_is_used() {
     let mut compiled = compile(&furnace(HALF));
     // L = Le / (1 - albedo), everywhere and from everywhere.
     let given = Some(known(&compiled.job.scene, 1.0, 2.0 * PI, PI));
-    let (flat, ..) = look(&mut compiled, shown(Display::Flat, given.clone()), 4);
-    assert!(
-        flat.iter().flatten().all(|v| (v - 2.0).abs() < 1e-5),
-        "{flat:?}"
-    );
+    for show in [Show::Flat, Show::Gouraud] {
+        let (flat, ..) = look(&mut compiled, shown(show, given.clone()), 4);
+        assert!(
+            flat.iter().flatten().all(|v| (v - 2.0).abs() < 1e-5),
+            "{flat:?}"
+        );
+    }
     for (integrator, reads) in [
-        (shown(Display::Gather, given.clone()), false),
+        (shown(Show::Gather, given.clone()), false),
         (cached(gather(given.clone())), true),
         (combined(gather(given)), true),
     ] {
@@ -155,7 +157,7 @@ fn a_furnace_is_the_same_however_its_radiosity_is_used() {
         );
     }
     for (integrator, tolerance) in [
-        (shown(Display::Flat, None), 0.01),
+        (shown(Show::Flat, None), 0.01),
         (cached(gather(None)), 0.003),
     ] {
         let (_, (mean, stderr), _) = look(&mut compiled, integrator, 256);
@@ -176,7 +178,7 @@ fn a_clear_coat_is_walked_by_and_its_base_is_shown() {
         // The furnace of a surface whose reflectance depends on the angle has no closed form: radiance that is the
         // same everywhere is put in, and the same light must come out of any use of it.
         let given = Some(known(&compiled.job.scene, 1.0, 1.5 * PI, PI));
-        let (_, flat, _) = look(&mut compiled, shown(Display::Flat, given), spp);
+        let (_, flat, _) = look(&mut compiled, shown(Show::Flat, given), spp);
         let (_, path, _) = look(
             &mut compiled,
             IntegratorSpec::Path(PathSpec::default()),
@@ -199,7 +201,7 @@ fn a_final_gather_agrees_with_path_tracing() {
         IntegratorSpec::Path(PathSpec::default()),
         spp,
     );
-    for integrator in [cached(gather(None)), shown(Display::Gather, None)] {
+    for integrator in [cached(gather(None)), shown(Show::Gather, None)] {
         let (picture, found, _) = look(&mut compiled, integrator, spp);
         let noise = 4.5 * mean.1.hypot(found.1);
         assert!(
@@ -255,8 +257,9 @@ fn threads_do_not_change_the_picture() {
     for integrator in [
         cached(gather(None)),
         combined(gather(None)),
-        shown(Display::Flat, None),
-        shown(Display::Gather, None),
+        shown(Show::Flat, None),
+        shown(Show::Gouraud, None),
+        shown(Show::Gather, None),
     ] {
         let mut compiled = compile(&room(&(LAMP.to_string() + MIRROR)));
         let mut with = |threads| {
@@ -300,8 +303,9 @@ fn odd_scenes_are_rendered_without_a_fault() {
         for integrator in [
             cached(gather(None)),
             combined(gather(None)),
-            shown(Display::Flat, None),
-            shown(Display::Gather, None),
+            shown(Show::Flat, None),
+            shown(Show::Gouraud, None),
+            shown(Show::Gather, None),
         ] {
             let mut compiled = compile(&xml);
             for depth in [None, Some(0), Some(1), Some(2), Some(3), Some(4)] {
@@ -354,7 +358,7 @@ fn a_scene_without_use_for_it_is_not_solved_and_paths_are_as_before() {
 #[test]
 fn what_cannot_be_solved_is_an_error_before_rendering() {
     let mut compiled = compile(&room(LAMP));
-    let mut integrator = shown(Display::Flat, None);
+    let mut integrator = shown(Show::Flat, None);
     *integrator.solve().unwrap() = SolveSpec {
         patch_size: Some(1e-3),
         max_patches: 1000,

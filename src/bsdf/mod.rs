@@ -187,6 +187,24 @@ impl Bsdf {
         }
     }
 
+    /// Whether no light passes through.
+    #[inline]
+    pub fn is_opaque(&self) -> bool {
+        match self {
+            Bsdf::Diffuse(_)
+            | Bsdf::Conductor(_)
+            | Bsdf::RoughConductor(_)
+            | Bsdf::Plastic(_)
+            | Bsdf::RoughPlastic(_) => true,
+            Bsdf::Principled(b) => b.spec_trans == 0.0,
+            Bsdf::Dielectric(_)
+            | Bsdf::ThinDielectric(_)
+            | Bsdf::RoughDielectric(_)
+            | Bsdf::PrincipledThin(_)
+            | Bsdf::Null(_) => false,
+        }
+    }
+
     /// Whether [`Bsdf::sample`] uses `u_lobe`.
     #[inline]
     pub fn has_lobes(&self) -> bool {

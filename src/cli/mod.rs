@@ -4,6 +4,7 @@
 pub mod compare;
 mod info;
 mod progress;
+mod radiosity;
 mod render;
 
 use std::ffi::OsString;
@@ -35,6 +36,8 @@ enum Command {
     /// Render a scene to an image, with an estimate of its error
     Render(Box<render::RenderArgs>),
     Compare(Box<compare::CompareArgs>),
+    /// Solve for the radiosity of a scene, and write it as a mesh with colours
+    Radiosity(Box<radiosity::RadiosityArgs>),
     /// Show what a scene contains and what is modelled for it, or what is supported at all
     Info(info::InfoArgs),
     /// Print a completion script for a shell
@@ -140,6 +143,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let result = match &cli.command {
         Command::Render(args) => render::run(args, &line),
         Command::Compare(args) => compare::run(args),
+        Command::Radiosity(args) => radiosity::run(args, &line),
         Command::Info(args) => info::run(args),
         Command::Completions { shell } => {
             let mut script = Vec::new();

@@ -99,6 +99,66 @@ fn message(film: &Film, stats: &Stats, stop: Stop) -> String {
     )
 }
 
+/// Shows on stderr how far a solver of radiosity has come.
+pub enum Steps {
+    Off,
+    Line {
+        bar: ProgressBar,
+        start: Instant,
+        last: Instant,
+    },
+    Lines {
+        start: Instant,
+        last: Instant,
+    },
+}
+
+impl Steps {
+    pub fn new(mode: ProgressMode) -> Steps {
+        let (start, last) = (Instant::now(), Instant::now());
+        match mode {
+            ProgressMode::Never => Steps::Off,
+            ProgressMode::Auto if std::io::stderr().is_terminal() => {
+                let bar = ProgressBar::new_spinner();
+                Steps::Line { bar, start, last }
+            }
+            ProgressMode::Auto => Steps::Lines { start, last },
+        }
+    }
+
+    pub fn update(&mut self, at: &crate::radiosity::Progress) {
+        /// Steps can be many in a second.
+        const OFTEN: Duration = Duration::from_millis(100);
+        let text = |start: &Instant| {
+            format!(
+                "step {}  {} patches  residual {:.1e}  {}",
+                at.step,
+                at.mesh.len(),
+                at.residual,
+                human_seconds(start.elapsed().as_secs_f64())
+            )
+        };
+        match self {
+            Steps::Line { bar, start, last } if last.elapsed() >= OFTEN => {
+                *last = Instant::now();
+                bar.set_message(text(start));
+                bar.tick();
+            }
+            Steps::Lines { start, last } if last.elapsed() >= LINE_EVERY => {
+                *last = Instant::now();
+                eprintln!("{}", text(start));
+            }
+            _ => {}
+        }
+    }
+
+    pub fn finish(&self) {
+        if let Steps::Line { bar, .. } = self {
+            bar.finish_and_clear();
+        }
+    }
+}
+
 /// `3.2 s`, `2 min 5 s`, `1 h 12 min`.
 pub fn human_seconds(s: f64) -> String {
     match s {

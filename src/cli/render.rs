@@ -124,7 +124,7 @@ pub fn parse_define(text: &str) -> Result<(String, String), String> {
 
 pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
     let stopped = Arc::new(AtomicBool::new(false));
-    watch_for_interrupt(&stopped)?;
+    watch_for_interrupt(&stopped, "pass")?;
     let pool = pool(args.threads)?;
     let outputs = outputs(args);
     if let Some(unknown) = outputs.iter().find(|p| !Image::can_write_extension(p)) {
@@ -219,29 +219,32 @@ struct Seconds {
     write: Duration,
 }
 
-/// First Ctrl-C: finish the pass and write. Second: end at once.
-fn watch_for_interrupt(stopped: &Arc<AtomicBool>) -> Result<(), Failure> {
+/// First Ctrl-C: finish the pass, or whatever the `work` is made of, and write. Second: end at once.
+pub(super) fn watch_for_interrupt(
+    stopped: &Arc<AtomicBool>,
+    work: &'static str,
+) -> Result<(), Failure> {
     let flag = Arc::clone(stopped);
     let handler = move || {
         if flag.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }
         eprintln!(
-            "\nstopping after this pass and writing what is done; press Ctrl-C again to end at once"
+            "\nstopping after this {work} and writing what is done; press Ctrl-C again to end at once"
         );
     };
     ctrlc::set_handler(handler).map_err(|e| Failure::Input(format!("cannot watch for Ctrl-C: {e}")))
 }
 
 /// The threads that were asked for.
-fn pool(threads: Option<u16>) -> Result<ThreadPool, Failure> {
+pub(super) fn pool(threads: Option<u16>) -> Result<ThreadPool, Failure> {
     let count = threads.map_or(0, usize::from);
     let pool = ThreadPoolBuilder::new().num_threads(count).build();
     pool.map_err(|e| Failure::Usage(format!("cannot start {count} threads: {e}")))
 }
 
 /// The scene's file name without folder and extension.
-fn scene_name(scene: Option<&Path>) -> String {
+pub(super) fn scene_name(scene: Option<&Path>) -> String {
     let stem = scene
         .and_then(Path::file_stem)
         .map(|s| s.to_string_lossy().into_owned());
@@ -408,7 +411,7 @@ fn statistics(
 }
 
 /// Most memory the program has held, in bytes, where the system tells it (Linux).
-fn peak_memory() -> Option<u64> {
+pub(super) fn peak_memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
     let kib: u64 = line.split_whitespace().nth(1)?.parse().ok()?;

@@ -76,7 +76,7 @@ impl Emitter {
 
     /// Where it stands, if it has no extent.
     #[inline]
-    fn standpoint(&self) -> Option<Vec3> {
+    pub fn standpoint(&self) -> Option<Vec3> {
         match self {
             Emitter::Point { p, .. } => Some(*p),
             Emitter::Spot(spot) => Some(spot.position()),
@@ -87,7 +87,7 @@ impl Emitter {
 
     /// Of what has no extent, in W/sr along the unit vector `w`.
     #[inline]
-    fn intensity(&self, w: Vec3) -> Rgb {
+    pub fn intensity(&self, w: Vec3) -> Rgb {
         match self {
             Emitter::Point { intensity, .. } => *intensity,
             Emitter::Spot(spot) => spot.intensity(w),

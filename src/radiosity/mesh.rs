@@ -250,7 +250,9 @@ pub fn size_for(surfaces: &Surfaces, wanted: u64) -> f64 {
 fn parts(piece: &Piece, size: f64) -> [f64; 2] {
     /// Into how many parts a needle is cut for its shape alone.
     const MOST: f64 = 64.0;
-    let part = |length: f64, size: f64| (length / size).ceil().max(1.0);
+    /// By how much an edge may be longer, relatively, so that rounding makes no more of it.
+    const ROUNDING: f64 = 1e-6;
+    let part = |length: f64, size: f64| (length / size * (1.0 - ROUNDING)).ceil().max(1.0);
     match piece.outline {
         Outline::Triangle => [part(piece.longest_edge(), size); 2],
         Outline::Parallelogram => {
@@ -288,7 +290,13 @@ pub fn patches(scene: &Scene, surfaces: &Surfaces, pieces: &[(u32, Piece)]) -> V
 /// Optics averaged over a piece of a facet: over more points where the material varies.
 pub fn of_piece(scene: &Scene, surfaces: &Surfaces, facet: u32, piece: &Piece) -> Optics {
     let shape = surfaces.facets()[facet as usize].shape;
-    let points = if scene.varies(shape) { 36 } else { 1 };
+    let points = if scene.varies(shape) { 64 } else { 1 };
     let look = |st| on_facet(scene, surfaces, facet, piece, st);
-    optics::mean(scene, look, piece.outline, points)
+    optics::mean(
+        scene,
+        look,
+        piece.outline,
+        points,
+        surfaces.gloss_as_diffuse,
+    )
 }

@@ -8,7 +8,9 @@
 //! What other lobes than diffuse ones do to light is left out. The result is biased; it converges with the size
 //! of the patches for scenes of diffuse surfaces.
 
+pub mod discontinuity;
 pub mod display;
+pub mod export;
 pub mod form_factors;
 pub mod guide;
 pub mod hierarchy;
@@ -80,7 +82,8 @@ pub struct SolveSpec {
     pub patch_size: Option<f64>,
     /// Shortest edge that the hierarchical solver makes; `None`: a part of the size of the scene.
     pub min_size: Option<f64>,
-    /// Greatest error of a link of the hierarchical solver, as a share of the power that the scene emits.
+    /// Greatest error of a link of the hierarchical solver: the error of its receiver's irradiance as a share of
+    /// the irradiance that is usual there, times the receiver's share of the area of all surfaces.
     pub error: f64,
     /// The iteration ends when the residual, relative to the emitted power, is less.
     pub residual: f64,
@@ -92,6 +95,9 @@ pub struct SolveSpec {
     pub discontinuities: bool,
     /// Curved shapes differ from their facets by at most this share of their radius.
     pub curve_error: f64,
+    /// Treat what opaque surfaces reflect in other ways than diffusely as if it were diffuse. The light is then not
+    /// lost to the solution, but goes astray: better for guiding walks, and for what they read.
+    pub gloss_as_diffuse: bool,
     /// Most patches; more are an error before anything is solved.
     pub max_patches: u64,
     pub seed: u64,
@@ -110,6 +116,7 @@ impl Default for SolveSpec {
             ambient: true,
             discontinuities: false,
             curve_error: 0.02,
+            gloss_as_diffuse: false,
             max_patches: 4_000_000,
             seed: 0,
         }
@@ -280,7 +287,7 @@ pub fn solve(
     spec: &SolveSpec,
     observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Solution, SolveError> {
-    let surfaces = Arc::new(Surfaces::new(scene, spec.curve_error));
+    let surfaces = Arc::new(Surfaces::of(scene, spec.curve_error, spec.gloss_as_diffuse));
     if surfaces.facets().is_empty() {
         return Err(SolveError::NoPatches);
     }

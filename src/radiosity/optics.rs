@@ -14,6 +14,8 @@ pub struct Optics {
     pub albedo: Rgb64,
     /// Share of light from the normal's direction that is scattered in other ways: by mirrors, gloss, glass.
     pub other: Rgb64,
+    /// Of it, what surfaces scatter that light does not pass through.
+    pub gloss: Rgb64,
     /// Exitance of the emitter that the surface is, in W/m².
     pub emission: Rgb64,
 }
@@ -26,40 +28,63 @@ pub fn at(scene: &Scene, hit: &Hit, u: f32) -> Optics {
         true => shading.bsdf.diffuse_albedo(),
         false => Rgb::BLACK,
     };
-    let all = shading.albedo();
+    let other = rgb64(shading.albedo() - albedo).max(Rgb64::ZERO);
     Optics {
         albedo: rgb64(albedo).clamp(Rgb64::ZERO, Rgb64::ONE),
-        other: rgb64(all - albedo).max(Rgb64::ZERO),
+        other,
+        gloss: match seen && shading.bsdf.is_opaque() {
+            true => other,
+            false => Rgb64::ZERO,
+        },
         emission: rgb64(scene.le(hit)) * PI,
     }
 }
 
-/// Whether a side of a surface reflects diffusely or shines, judged at a few points.
-pub fn takes_part(scene: &Scene, look: impl Fn(DVec2) -> Hit, outline: Outline) -> bool {
-    let mean = mean(scene, look, outline, 4);
+/// Whether a side of a surface reflects diffusely or shines, judged at about `points` points.
+pub fn takes_part(
+    scene: &Scene,
+    look: impl Fn(DVec2) -> Hit,
+    outline: Outline,
+    points: u32,
+    gloss_as_diffuse: bool,
+) -> bool {
+    let mean = mean(scene, look, outline, points, gloss_as_diffuse);
     mean.albedo + mean.emission != Rgb64::ZERO
 }
 
-/// The mean over a grid of about `points` points in the piece's outline, which `look` turns into hits.
-pub fn mean(scene: &Scene, look: impl Fn(DVec2) -> Hit, outline: Outline, points: u32) -> Optics {
-    let side = f64::from(points).sqrt().ceil().max(1.0) as u32;
+/// The mean over `points` points in the piece's outline, which `look` turns into hits. The points are spread well
+/// but not in rows, which patterns of textures could fall in step with (the sequence R of Roberts 2018, "The
+/// Unreasonable Effectiveness of Quasirandom Sequences"). With `gloss_as_diffuse`, what is reflected in other ways
+/// counts as reflected diffusely.
+pub fn mean(
+    scene: &Scene,
+    look: impl Fn(DVec2) -> Hit,
+    outline: Outline,
+    points: u32,
+    gloss_as_diffuse: bool,
+) -> Optics {
     let mut sum = Optics::default();
-    let n = side * side;
+    let n = points.max(1);
     for i in 0..n {
-        let (x, y) = (i % side, i / side);
-        let u = (DVec2::new(f64::from(x), f64::from(y)) + 0.5) / f64::from(side);
+        let at = |step: f64| (0.5 + f64::from(i) * step).fract();
+        let u = DVec2::new(at(0.754_877_666_246_693), at(0.569_840_290_998_053));
         let hit = look(outline.sample(u));
-        // Well spread also over the choices of mixed materials (van der Corput by the golden ratio).
-        let choice = (f64::from(i) * 0.618_033_988_749_895 + 0.5).fract();
-        let one = at(scene, &hit, choice as f32);
+        // Well spread also over the choices of mixed materials (the golden ratio).
+        let one = self::at(scene, &hit, at(0.618_033_988_749_895) as f32);
         sum.albedo += one.albedo;
         sum.other += one.other;
+        sum.gloss += one.gloss;
         sum.emission += one.emission;
     }
     let share = 1.0 / f64::from(n);
+    let turned = match gloss_as_diffuse {
+        true => sum.gloss,
+        false => Rgb64::ZERO,
+    };
     Optics {
-        albedo: sum.albedo * share,
-        other: sum.other * share,
+        albedo: ((sum.albedo + turned) * share).min(Rgb64::ONE),
+        other: (sum.other - turned) * share,
+        gloss: (sum.gloss - turned) * share,
         emission: sum.emission * share,
     }
 }

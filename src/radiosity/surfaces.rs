@@ -77,14 +77,26 @@ pub struct Surfaces {
     pub left_out: LeftOut,
     /// Largest distance of a curved shape from its facets, relative to its radius.
     pub curve_error: f64,
+    /// Whether opaque surfaces that reflect in other ways than diffusely are treated as if they did so diffusely:
+    /// their light is not lost, but goes astray.
+    pub gloss_as_diffuse: bool,
 }
 
 const NONE: u32 = u32::MAX;
+
+/// Area over the square of the longest edge of what is a line, or a point: halves of cells at poles are no more,
+/// and coordinates in f32 cannot say less.
+const LEAST_AREA: f64 = 1e-12;
 
 impl Surfaces {
     /// Cuts all surfaces of `scene` that stand still. Facets keep nearer to curved shapes than `curve_error` of
     /// their radius. A side without diffuse reflection and emission has no facets.
     pub fn new(scene: &Scene, curve_error: f64) -> Surfaces {
+        Surfaces::of(scene, curve_error, false)
+    }
+
+    /// The same; with `gloss_as_diffuse`, sides that reflect in whatever way have facets.
+    pub fn of(scene: &Scene, curve_error: f64, gloss_as_diffuse: bool) -> Surfaces {
         let world = scene.world();
         let mut surfaces = Surfaces {
             facets: Vec::new(),
@@ -93,6 +105,7 @@ impl Surfaces {
             facet_of: Vec::new(),
             left_out: LeftOut::default(),
             curve_error,
+            gloss_as_diffuse,
         };
         for number in 0..world.geometries().len() as u32 {
             let shape = ShapeId(number);
@@ -127,21 +140,35 @@ impl Surfaces {
         if !slot.known {
             return None;
         }
-        let index = match slot.cells {
-            [0, 0] => hit.prim as usize,
+        let inside = usize::from(hit.wo.dot(hit.ng) < 0.0);
+        let facet = match slot.cells {
+            [0, 0] => self.facet_of.get(slot.first + hit.prim as usize)?[inside],
             [nu, nv] => {
-                let cell = |x: f32, n: u32| {
-                    let scaled = x * n as f32;
-                    let i = (scaled as u32).min(n - 1);
-                    (i, scaled - i as f32)
-                };
-                let ((i, x), (j, y)) = (cell(hit.uv.x, nu), cell(hit.uv.y, nv));
-                ((j * nu + i) * 2 + u32::from(y > x)) as usize
+                let cell = |x: f32, n: u32| ((x * n as f32) as u32).min(n - 1);
+                let (i, j) = (cell(hit.uv.x, nu), cell(hit.uv.y, nv));
+                let first = slot.first + (j * nu + i) as usize * 2;
+                let halves = self.facet_of.get(first..first + 2)?;
+                self.nearer([halves[0][inside], halves[1][inside]], hit.p.as_dvec3())
             }
         };
-        let inside = usize::from(hit.wo.dot(hit.ng) < 0.0);
-        let facet = self.facet_of.get(slot.first + index)?[inside];
         (facet != NONE).then_some(facet)
+    }
+
+    /// Which half of a cell `p` is over, of those that there are: the edge between them is straight in space, not
+    /// in the parameters of the shape.
+    #[inline]
+    fn nearer(&self, [a, b]: [u32; 2], p: DVec3) -> u32 {
+        if a == b || b == NONE {
+            return a;
+        }
+        let inside = |facet: u32| {
+            let st = self.facets[facet as usize].piece.locate(p);
+            st.x.min(st.y).min(1.0 - st.x - st.y)
+        };
+        match a == NONE || inside(b) > inside(a) {
+            true => b,
+            false => a,
+        }
     }
 
     /// The surface at `st` of a facet, seen from its front: on the exact surface, with error bounds, as a ray
@@ -230,11 +257,15 @@ impl Surfaces {
     ) -> [u32; 2] {
         // A chord of the angle a leaves the circle by 1 - cos(a/2) of the radius.
         let angle = 2.0 * (1.0 - self.curve_error.clamp(1e-6, 0.3)).acos();
-        let around = (std::f64::consts::TAU / angle).ceil().max(6.0) as u32;
+        let around = |angle: f64| (std::f64::consts::TAU / angle).ceil().max(6.0) as u32;
         let (nu, nv) = match shape_geometry {
-            Geometry::Sphere(_) => (around, around.div_ceil(2)),
-            Geometry::Disk(_) => (1, around),
-            _ => (around, 1),
+            // The middle of a cell's diagonal leaves the sphere by as much as both of its sides together.
+            Geometry::Sphere(_) => {
+                let around = around(angle * std::f64::consts::FRAC_1_SQRT_2);
+                (around, around.div_ceil(2))
+            }
+            Geometry::Disk(_) => (1, around(angle)),
+            _ => (around(angle), 1),
         };
         let surface = self.facet_of.len() as u32 * 2;
         for j in 0..nv {
@@ -278,7 +309,8 @@ impl Surfaces {
     /// The facet seen from both of its sides, as far as these take part. `facet.piece` has its corners in the
     /// order of the shape; the numbers of what was made of it, outside first.
     fn add(&mut self, scene: &Scene, mut facet: Facet) -> [u32; 2] {
-        if facet.piece.area() <= 0.0 || !facet.piece.area().is_finite() {
+        let area = facet.piece.area();
+        if !(area > LEAST_AREA * facet.piece.longest_edge().powi(2) && area.is_finite()) {
             self.left_out.degenerate += 1;
             return [NONE; 2];
         }
@@ -296,12 +328,13 @@ impl Surfaces {
                 facet.inside = true;
                 facet.surface += 1;
             }
-            if super::optics::takes_part(scene, |st| look(scene, &facet, st), facet.piece.outline) {
+            let points = if scene.varies(facet.shape) { 16 } else { 1 };
+            let (look, outline) = (|st| look(scene, &facet, st), facet.piece.outline);
+            if super::optics::takes_part(scene, look, outline, points, self.gloss_as_diffuse) {
                 *number = self.facets.len() as u32;
                 self.facets.push(facet);
             }
         }
-        let area = facet.piece.area();
         self.left_out.area += area;
         if sides == [NONE; 2] {
             self.left_out.idle_area += area;
@@ -362,7 +395,9 @@ fn look(scene: &Scene, facet: &Facet, st: DVec2) -> Hit {
             _ => (b, weights(scene, facet, mesh, b, p).0),
         },
         (Origin::Cell([a, b, c]), curved) => {
-            let uv = a + (b - a) * st.x as f32 + (c - a) * st.y as f32;
+            // Over the flat piece, not in between its parameters: these bend it, most of all around poles.
+            let [o, e, f] = [a, b, c].map(|uv| curved.at_uv(uv.as_dvec2()));
+            let uv = curved.uv_at((o + (e - o) * st.x + (f - o) * st.y).as_vec3());
             let exact = curved.at_uv(uv.as_dvec2());
             let p = to_world(scene, facet.place, exact);
             return scene.hit_at(

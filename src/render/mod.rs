@@ -390,6 +390,7 @@ impl Pass<'_> {
                     let (transport, iteration) = (self.transport, self.iteration);
                     let mut li = transport.sample(iteration, &at, ray, &sampler, &mut ledger);
                     li.radiance *= seen.weight;
+                    ledger.settle(seen.weight * weight);
                     let radiance = li.radiance;
                     // Splats are told apart where they arrive.
                     let mut parts = PerTechnique::default();

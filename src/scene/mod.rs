@@ -132,6 +132,11 @@ impl Scene {
         }
     }
 
+    /// All lights, by their ids.
+    pub fn emitters(&self) -> &[Emitter] {
+        self.lights.emitters()
+    }
+
     /// dp/du and dp/dv at a hit, for bump maps; either is zero where it is undefined.
     pub fn dp_duv(&self, hit: &Hit) -> (Vec3, Vec3) {
         self.world.dp_duv(hit)

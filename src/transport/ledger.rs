@@ -76,8 +76,10 @@ pub struct Ledger {
     pub connections: PerTechnique<u64>,
     /// Light for wherever in the picture it arrives, in the order it was found.
     pub splats: Vec<Splat>,
-    /// What reading a cache of radiosity did to the picture.
+    /// What reading a cache of radiosity did to the picture, ...
     pub bias: Bias,
+    /// ... and to the sample under way.
+    pub(super) fresh_bias: Bias,
     /// Seconds spent on sorting photons into maps, by the thread that waited for it.
     pub map_seconds: f64,
     /// Luminance that the sample under way owes to each technique.
@@ -105,6 +107,15 @@ impl Ledger {
     #[inline]
     pub fn take_parts(&mut self) -> PerTechnique<f64> {
         std::mem::take(&mut self.parts)
+    }
+
+    /// Ends a sample that counts `weight` times in the picture.
+    #[inline]
+    pub fn settle(&mut self, weight: f32) {
+        if self.fresh_bias.reads > 0 {
+            let fresh = std::mem::take(&mut self.fresh_bias);
+            self.bias += fresh.scaled(f64::from(weight));
+        }
     }
 
     /// Makes a photon map with `build`, on the clock.

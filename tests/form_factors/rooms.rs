@@ -52,7 +52,7 @@ pub fn block(o: DVec3, [x, y, z]: [DVec3; 3]) -> String {
     .concat()
 }
 
-/// A unit box with two turned blocks in it: much like Cornell's.
+/// A unit box with two turned blocks that hover in it: all that is inside is seen, and nothing else.
 pub fn furnished() -> String {
     let turned = |degrees: f64, w: f64| {
         let (s, c) = degrees.to_radians().sin_cos();
@@ -64,8 +64,8 @@ pub fn furnished() -> String {
     let [a, b] = [turned(17.0, 0.3), turned(-16.0, 0.3)];
     [
         inside(DVec3::ZERO, DVec3::ONE),
-        block(DVec3::new(0.2, 0.5, 0.0), [a[0], a[1], DVec3::Z * 0.6]),
-        block(DVec3::new(0.52, 0.2, 0.0), [b[0], b[1], DVec3::Z * 0.3]),
+        block(DVec3::new(0.2, 0.5, 0.1), [a[0], a[1], DVec3::Z * 0.6]),
+        block(DVec3::new(0.52, 0.2, 0.1), [b[0], b[1], DVec3::Z * 0.3]),
     ]
     .concat()
 }
@@ -96,20 +96,18 @@ impl Room {
         FormFactors::new(&self.scene, &self.mesh, method, seed).matrix()
     }
 
-    /// From all patches on the outside of shape `from` to those of shape `to`.
-    pub fn between(&self, matrix: &Matrix, from: u32, to: u32) -> f64 {
-        let patches = |shape: u32| {
-            let facets = self.mesh.surfaces.facets();
-            let patches = self.mesh.patches.iter().enumerate();
-            patches.filter(move |(_, p)| {
-                let facet = &facets[p.facet as usize];
-                facet.shape.0 == shape && !facet.inside
-            })
-        };
-        let area: f64 = patches(from).map(|(_, p)| p.area).sum();
-        let mut sum = 0.0;
-        for (i, p) in patches(from) {
-            sum += p.area * patches(to).map(|(j, _)| matrix.row(i)[j]).sum::<f64>();
+    /// The form factor from all patches of the first shape to all others.
+    pub fn from_first(&self, method: FormFactorMethod, seed: u64) -> f64 {
+        let factors = FormFactors::new(&self.scene, &self.mesh, method, seed);
+        let facets = self.mesh.surfaces.facets();
+        let mut row = vec![0.0; self.mesh.len()];
+        let (mut sum, mut area) = (0.0, 0.0);
+        for (i, patch) in self.mesh.patches.iter().enumerate() {
+            if facets[patch.facet as usize].shape.0 == 0 {
+                factors.row(i as u32, &mut row);
+                sum += patch.area * row.iter().sum::<f64>();
+                area += patch.area;
+            }
         }
         sum / area
     }

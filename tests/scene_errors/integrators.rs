@@ -120,12 +120,14 @@ command line:1:14: the integrator "ptracer" cannot connect light to the sensor "
 #[test]
 fn radiosity_without_use_or_effect() {
     says(
-        of("<integrator type='path'><string name='indirect' value='guide'/></integrator>"),
+        of(
+            "<integrator type='path'><string name='indirect' value='guide'/>\n<string name='solver' value='gauss'/></integrator>",
+        ),
         r#"
-a.xml:3:57: walks that radiosity guides are not supported
-  <integrator type='path'><string name='indirect' value='guide'/></integrator>
-                                                         ^
-  help: use "gather", which reads radiosity, or "none""#,
+a.xml:4:31: the solver "gauss" makes no links that walks could be guided by
+  <string name='solver' value='gauss'/></integrator>
+                              ^
+  help: use the solver "hierarchical""#,
     );
     says(
         of("<integrator type='path'><string name='solver' value='gauss'/></integrator>"),
@@ -133,10 +135,12 @@ a.xml:3:57: walks that radiosity guides are not supported
 a.xml:3:55: "solver" has no effect without radiosity
   <integrator type='path'><string name='solver' value='gauss'/></integrator>
                                                        ^
-  help: leave it out, or set "indirect" to "gather""#,
+  help: leave it out, or set "indirect" to "gather" or "guide""#,
     );
     says(
-        of("<integrator type='radiosity'><string name='solver' value='gauss'/><float name='error' value='1'/></integrator>"),
+        of(
+            "<integrator type='radiosity'><string name='solver' value='gauss'/><float name='error' value='1'/></integrator>",
+        ),
         r#"
 a.xml:3:93: "error" has no effect with the solver "gauss"
   <integrator type='radiosity'><string name='solver' value='gauss'/><float name='error' value='1'/></integrator>
@@ -154,7 +158,7 @@ a.xml:3:65: "resolution" has no effect with form factors by "analytic"
     says(
         of("<integrator type='radiosity'><string name='show' value='smooth'/></integrator>"),
         r#"
-a.xml:3:58: "show" must be one of "flat", "gather", not "smooth"
+a.xml:3:58: "show" must be one of "flat", "gouraud", "gather", not "smooth"
   <integrator type='radiosity'><string name='show' value='smooth'/></integrator>
                                                           ^"#,
     );

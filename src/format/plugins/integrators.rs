@@ -159,9 +159,9 @@ const MAX_PATCHES: Param = Param::int(
 );
 const SHOW: Param = Param::choice(
     "show",
-    &["flat", "gather"],
+    &["flat", "gouraud", "gather"],
     "gather",
-    "Patches as they are, or a final gather: light sent to the point that is seen.",
+    "Patches as they are, interpolated, or a final gather: light sent to the point that is seen.",
 );
 const INTEGRATORS: &[Slot] = &[Slot::new(Category::Integrator, 0, usize::MAX)];
 

@@ -37,7 +37,7 @@ impl Rules {
         let most = f64::from(samples).sqrt().ceil().clamp(1.0, 32.0) as usize;
         Rules {
             by_points: (1..=most).map(Rule::gauss).collect(),
-            contour: Rule::crowded(12),
+            contour: Rule::crowded(24),
         }
     }
 

@@ -37,6 +37,23 @@ impl Polygon {
         len: 0,
     };
 
+    /// The polygon of these corners, of which there are at most ten.
+    pub fn new(corners: &[DVec3]) -> Polygon {
+        let mut polygon = Polygon::EMPTY;
+        corners.iter().for_each(|p| polygon.push(*p));
+        polygon
+    }
+
+    /// Each corner moved.
+    #[inline]
+    pub fn map(&self, to: impl Fn(DVec3) -> DVec3) -> Polygon {
+        let mut polygon = *self;
+        for p in &mut polygon.corners[..self.len] {
+            *p = to(*p);
+        }
+        polygon
+    }
+
     #[inline]
     fn push(&mut self, p: DVec3) {
         // Rounding may make a polygon so little concave that a plane cuts it more than twice.

@@ -17,8 +17,8 @@ const KEPT: usize = 1 << 22;
 /// four-dimensional unit cube evenly, whatever their number (a Kronecker sequence, as the golden ratio is for one
 /// dimension; Roberts 2018, "The Unreasonable Effectiveness of Quasirandom Sequences").
 const STEPS: [DVec2; 2] = [
-    DVec2::new(0.856_674_883_854_502_9, 0.733_891_856_627_126_0),
-    DVec2::new(0.628_706_721_037_808_6, 0.538_597_257_223_610_0),
+    DVec2::new(0.856_674_883_854_502_9, 0.733_891_856_627_126),
+    DVec2::new(0.628_706_721_037_808_6, 0.538_597_257_223_61),
 ];
 
 /// Which two of the four dimensions of a pair of points a patch has.
@@ -67,20 +67,31 @@ impl<'a> Sight<'a> {
         sight
     }
 
+    /// Two numbers in [0,1): number `k` of a patch in its role.
+    #[inline]
+    pub fn number(&self, patch: u32, role: Role, k: u32) -> DVec2 {
+        let address = (u64::from(patch) << 1) ^ role as u64;
+        let hash = mix(mix(self.seed ^ 0x6666_5f73_6967_6874) ^ address);
+        let unit = |bits: u64| (bits >> 11) as f64 * (1.0 / (1u64 << 53) as f64);
+        let shift = DVec2::new(unit(hash), unit(mix(hash)));
+        (shift + STEPS[role as usize] * f64::from(k)).fract()
+    }
+
     /// Where point `k` of a patch lies, in the coordinates of its piece.
     #[inline]
     pub fn place(&self, patch: u32, role: Role, k: u32) -> DVec2 {
-        let hash =
-            mix(mix(self.seed ^ 0x6666_5f73_6967_6874) ^ (u64::from(patch) << 1) ^ role as u64);
-        let unit = |bits: u64| (bits >> 11) as f64 * (1.0 / (1u64 << 53) as f64);
-        let shift = DVec2::new(unit(hash), unit(mix(hash)));
-        let u = (shift + STEPS[role as usize] * f64::from(k)).fract();
-        self.mesh.patches[patch as usize].piece.outline.sample(u)
+        let outline = self.mesh.patches[patch as usize].piece.outline;
+        outline.sample(self.number(patch, role, k))
+    }
+
+    /// The surface at a place of a patch.
+    #[inline]
+    pub fn at(&self, patch: u32, st: DVec2) -> Endpoint {
+        Endpoint::from(&self.mesh.hit(self.scene, patch, st))
     }
 
     fn make(&self, patch: u32, role: Role, k: u32) -> Endpoint {
-        let hit = self.mesh.hit(self.scene, patch, self.place(patch, role, k));
-        Endpoint::from(&hit)
+        self.at(patch, self.place(patch, role, k))
     }
 
     #[inline]
@@ -105,7 +116,7 @@ impl<'a> Sight<'a> {
         let end = |(patch, p): (u32, DVec3)| {
             let piece = &self.mesh.patches[patch as usize].piece;
             let st = piece.outline.clamp(piece.locate(p));
-            Endpoint::from(&self.mesh.hit(self.scene, patch, st))
+            self.at(patch, st)
         };
         self.between(&end(first), &end(second))
     }

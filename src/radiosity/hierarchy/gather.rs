@@ -1,6 +1,6 @@
 //! Light over the links: gathered by each node, pushed down to the patches, and pulled up again.
 
-use super::tree::{Kind, NONE, Tree, TreeLink};
+use super::tree::{Kind, Tree, TreeLink, TreeNode};
 use crate::math::DVec3;
 use crate::radiosity::Rgb64;
 use rayon::prelude::*;
@@ -11,14 +11,22 @@ pub struct Field {
     /// Mean over the area of each node, in W/m².
     pub radiosity: Vec<Rgb64>,
     pub irradiance: Vec<Rgb64>,
-    /// Of the clusters, and cells below: radiant intensity by direction.
-    intensity: Vec<Intensity>,
+    /// What errors are judged against: the geometric mean of the irradiance of the surfaces of each node, in W/m².
+    pub usual: Vec<f64>,
+    /// Of the clusters, by their number: radiant intensity by direction.
+    intensity: Vec<Sphere>,
 }
 
-/// Radiant intensity of a small body, in W/sr, by its first nine spherical harmonics: enough for the light of
-/// diffuse surfaces up to a few percent (Ramamoorthi & Hanrahan 2001).
+/// Light by direction: radiant intensity of a small body in W/sr, or radiance that arrives in it, by the first
+/// nine spherical harmonics: enough for diffuse surfaces up to a few percent (Ramamoorthi & Hanrahan 2001).
 #[derive(Clone, Copy, Debug, Default)]
-struct Intensity([Rgb64; 9]);
+struct Sphere([Rgb64; 9]);
+
+/// The clamped cosine in each band.
+const COSINE: [f64; 9] = {
+    let (one, two) = (2.0 * PI / 3.0, PI / 4.0);
+    [PI, one, one, one, two, two, two, two, two]
+};
 
 /// Real spherical harmonics up to the second band.
 fn harmonics(d: DVec3) -> [f64; 9] {
@@ -36,23 +44,42 @@ fn harmonics(d: DVec3) -> [f64; 9] {
     ]
 }
 
-impl Intensity {
+impl Sphere {
     /// A surface of radiosity `b`.
-    fn of_surface(b: Rgb64, area: f64, normal: DVec3) -> Intensity {
-        // The clamped cosine in each band.
-        const BANDS: [f64; 9] = {
-            let (one, two) = (2.0 * PI / 3.0, PI / 4.0);
-            [PI, one, one, one, two, two, two, two, two]
-        };
+    fn add_surface(&mut self, b: Rgb64, area: f64, normal: DVec3) {
+        if b == Rgb64::ZERO {
+            return;
+        }
         let power = b * (area / PI);
         let y = harmonics(normal);
-        Intensity(std::array::from_fn(|i| power * (BANDS[i] * y[i])))
+        for (c, (cosine, y)) in self.0.iter_mut().zip(COSINE.iter().zip(y)) {
+            *c += power * (cosine * y);
+        }
     }
 
-    fn add(&mut self, o: &Intensity) {
+    fn add(&mut self, o: &Sphere) {
         for (a, b) in self.0.iter_mut().zip(o.0) {
             *a += b;
         }
+    }
+
+    /// Light from the unit vector `d` alone: irradiance `e` on what is at right angles to it.
+    fn add_from(&mut self, d: DVec3, e: Rgb64) {
+        for (c, y) in self.0.iter_mut().zip(harmonics(d)) {
+            *c += e * y;
+        }
+    }
+
+    /// The same radiance from everywhere.
+    fn add_everywhere(&mut self, radiance: Rgb64) {
+        self.0[0] += radiance * (2.0 * PI.sqrt());
+    }
+
+    /// Irradiance of a surface with unit normal `n`.
+    fn irradiance(&self, n: DVec3) -> Rgb64 {
+        let y = harmonics(n);
+        let sum: Rgb64 = (0..9).map(|i| self.0[i] * (COSINE[i] * y[i])).sum();
+        sum.max(Rgb64::ZERO)
     }
 
     fn towards(&self, d: DVec3) -> Rgb64 {
@@ -75,6 +102,7 @@ impl Field {
         let mut field = Field {
             radiosity: tree.nodes.iter().map(|n| n.emission).collect(),
             irradiance: vec![Rgb64::ZERO; tree.nodes.len()],
+            usual: Vec::new(),
             intensity: Vec::new(),
         };
         for (b, node) in field.radiosity.iter_mut().zip(&tree.nodes) {
@@ -89,6 +117,7 @@ impl Field {
         let mut field = Field {
             radiosity: tree.nodes.iter().map(|n| n.emission).collect(),
             irradiance: vec![Rgb64::ZERO; tree.nodes.len()],
+            usual: Vec::new(),
             intensity: Vec::new(),
         };
         field.pull(tree);
@@ -107,7 +136,32 @@ impl Field {
                 false => node.emission + node.albedo * irradiance.max(node.external),
             });
             self.irradiance.push(irradiance);
+            let usual = self.usual[node.parent as usize];
+            self.usual.push(usual);
         }
+    }
+
+    /// Takes the light that there is as what errors are judged against.
+    /// What is darker than `black`, as a share of the mean, counts as that dark.
+    pub fn judge_by(&mut self, tree: &Tree, black: f64) {
+        let mean = self.irradiance[0].max_element();
+        if !(mean > 0.0) {
+            self.usual = vec![self.radiosity[0].max_element(); tree.nodes.len()];
+            return;
+        }
+        // Means of logarithms, pulled up from the patches.
+        let floor = |e: Rgb64| e.max_element().max(black * mean).ln();
+        let mut logs: Vec<f64> = self.irradiance.iter().map(|e| floor(*e)).collect();
+        for &i in tree.by_cluster.iter().rev() {
+            let i = i as usize;
+            let node = &tree.nodes[i];
+            if node.area > 0.0 {
+                let inside = tree.children(i as u32).map(|c| c as usize);
+                let sum: f64 = inside.map(|c| logs[c] * tree.nodes[c].area).sum();
+                logs[i] = sum / node.area;
+            }
+        }
+        self.usual = logs.into_iter().map(f64::exp).collect();
     }
 
     /// All nodes gather what the others send. Gives Σ A |ΔB| over the patches, summed over the channels, in W.
@@ -137,52 +191,91 @@ impl Field {
     }
 
     fn gathered(&self, tree: &Tree) -> Vec<Vec<Update>> {
-        let gather = |&cell: &u32| {
-            let mut updates = Vec::new();
-            let above = self.from_above(tree, cell);
-            self.push(tree, cell, above, &mut updates);
+        /// Cells that one task gathers for.
+        const CHUNK: usize = 256;
+        let around = self.around_clusters(tree);
+        let gather = |cells: &[u32]| {
+            let mut updates = Vec::with_capacity(2 * cells.len());
+            for &cell in cells {
+                let node = &tree.nodes[cell as usize];
+                let above = match tree.clusters.get(node.parent as usize) {
+                    Some(&number) => around[number as usize].irradiance(node.normal),
+                    None => Rgb64::ZERO,
+                };
+                self.push(tree, cell, above, &mut updates);
+            }
             updates
         };
-        tree.cells.par_iter().map(gather).collect()
+        tree.cells.par_chunks(CHUNK).map(gather).collect()
     }
 
-    /// Irradiance of a cell by what its clusters are linked to.
-    fn from_above(&self, tree: &Tree, cell: u32) -> Rgb64 {
-        let receiver = &tree.nodes[cell as usize];
-        let mut sum = Rgb64::ZERO;
-        let mut above = receiver.parent;
-        while above != NONE {
-            let cluster = &tree.nodes[above as usize];
-            for link in &cluster.links {
-                sum += self.seen_from(tree, receiver.center, receiver.normal, link);
+    /// The light that arrives at each cluster by its links and those of the clusters around it.
+    fn around_clusters(&self, tree: &Tree) -> Vec<Sphere> {
+        let own = |&node: &u32| {
+            let node = &tree.nodes[node as usize];
+            let mut sum = Sphere::default();
+            for link in &node.links {
+                self.add_arriving(tree, node, link, &mut sum);
             }
-            above = cluster.parent;
+            sum
+        };
+        let mut around: Vec<Sphere> = tree.by_cluster.par_iter().map(own).collect();
+        // Clusters come before what they contain.
+        for (i, &node) in tree.by_cluster.iter().enumerate() {
+            let parent = tree.nodes[node as usize].parent;
+            if let Some(&above) = tree.clusters.get(parent as usize) {
+                let above = around[above as usize];
+                around[i].add(&above);
+            }
         }
-        sum
+        around
     }
 
-    /// Irradiance at a point by a link, by direction and distance.
-    fn seen_from(&self, tree: &Tree, p: DVec3, n: DVec3, link: &TreeLink) -> Rgb64 {
+    /// What a link brings to a cluster.
+    fn add_arriving(&self, tree: &Tree, receiver: &TreeNode, link: &TreeLink, sum: &mut Sphere) {
         let sender = &tree.nodes[link.sender as usize];
-        let d = sender.center - p;
-        let d2 = d.length_squared();
-        let cos = d.dot(n);
-        if !(cos > 0.0) || link.visible == 0.0 {
-            return Rgb64::ZERO;
+        let d = sender.center - receiver.center;
+        let distance = d.length();
+        if distance <= receiver.radius + sender.radius {
+            // From no direction in particular.
+            let radiance = self.radiosity[link.sender as usize] * f64::from(link.form_factor) / PI;
+            return sum.add_everywhere(radiance);
         }
-        let distance = d2.sqrt();
-        // Within a body's own size, its light does not grow any more.
-        let falloff =
-            f64::from(link.visible) * (cos / distance) / d2.max(sender.radius * sender.radius);
-        match sender.kind {
+        let towards = d / distance;
+        let flux = self.sent_towards(tree, link.sender, -towards);
+        sum.add_from(
+            towards,
+            flux * (f64::from(link.visible) / (distance * distance)),
+        );
+    }
+
+    /// Radiant intensity of a node in W/sr towards the unit vector `d`.
+    fn sent_towards(&self, tree: &Tree, sender: u32, d: DVec3) -> Rgb64 {
+        let node = &tree.nodes[sender as usize];
+        match node.kind {
             Kind::Surface { .. } => {
-                let cos = (-d.dot(sender.normal) / distance).max(0.0);
-                self.radiosity[link.sender as usize] * (sender.area * cos * falloff / PI)
+                let cos = d.dot(node.normal).max(0.0);
+                self.radiosity[sender as usize] * (node.area * cos / PI)
             }
             Kind::Cluster { .. } => {
-                self.intensity[link.sender as usize].towards(-d / distance) * falloff
+                self.intensity[tree.clusters[sender as usize] as usize].towards(d)
             }
         }
+    }
+
+    /// Irradiance of a surface by a link.
+    fn received(&self, tree: &Tree, receiver: &TreeNode, link: &TreeLink) -> Rgb64 {
+        let sender = &tree.nodes[link.sender as usize];
+        let d = sender.center - receiver.center;
+        let distance = d.length();
+        let by_factor = !sender.is_cluster() || distance <= receiver.radius + sender.radius;
+        if by_factor {
+            return self.radiosity[link.sender as usize] * f64::from(link.form_factor);
+        }
+        let towards = d / distance;
+        let cos = towards.dot(receiver.normal).max(0.0);
+        let flux = self.sent_towards(tree, link.sender, -towards);
+        flux * (cos * f64::from(link.visible) / (distance * distance))
     }
 
     /// Brings light to the patches below `node` and back up: gives the mean radiosity and irradiance.
@@ -196,10 +289,7 @@ impl Field {
         let n = &tree.nodes[node as usize];
         let mut gathered = above;
         for link in &n.links {
-            gathered += match tree.nodes[link.sender as usize].is_cluster() {
-                true => self.seen_from(tree, n.center, n.normal, link),
-                false => self.radiosity[link.sender as usize] * f64::from(link.form_factor),
-            };
+            gathered += self.received(tree, n, link);
         }
         let children = tree.children(node);
         let (radiosity, irradiance) = match children.is_empty() {
@@ -226,39 +316,36 @@ impl Field {
 
     /// Means and intensities of the clusters, by what they contain.
     fn pull(&mut self, tree: &Tree) {
-        let count = tree
-            .cells
-            .iter()
-            .copied()
-            .max()
-            .map_or(0, |m| m as usize + 1);
         self.intensity.clear();
-        self.intensity.resize(count, Intensity::default());
-        for i in (0..count).rev() {
+        self.intensity
+            .resize(tree.by_cluster.len(), Sphere::default());
+        for (number, &i) in tree.by_cluster.iter().enumerate().rev() {
+            let i = i as usize;
             let node = &tree.nodes[i];
-            match node.kind {
-                Kind::Surface { .. } => {
-                    let b = self.radiosity[i];
-                    self.intensity[i] = Intensity::of_surface(b, node.area, node.normal);
-                }
-                Kind::Cluster { first, count } => {
-                    let (mut power, mut arriving) = (Rgb64::ZERO, Rgb64::ZERO);
-                    let mut sum = Intensity::default();
-                    for child in first as usize..(first + count) as usize {
-                        power += self.radiosity[child] * tree.nodes[child].area;
-                        arriving += self.irradiance[child] * tree.nodes[child].area;
-                        sum.add(&self.intensity[child]);
+            let (mut power, mut arriving) = (Rgb64::ZERO, Rgb64::ZERO);
+            let mut sum = Sphere::default();
+            for child in tree.children(i as u32).map(|c| c as usize) {
+                let inside = &tree.nodes[child];
+                power += self.radiosity[child] * inside.area;
+                arriving += self.irradiance[child] * inside.area;
+                match inside.kind {
+                    Kind::Surface { .. } => {
+                        sum.add_surface(self.radiosity[child], inside.area, inside.normal);
                     }
-                    let share = if node.area > 0.0 {
-                        1.0 / node.area
-                    } else {
-                        0.0
-                    };
-                    self.radiosity[i] = power * share;
-                    self.irradiance[i] = arriving * share;
-                    self.intensity[i] = sum;
+                    Kind::Cluster { .. } => {
+                        let inside = self.intensity[tree.clusters[child] as usize];
+                        sum.add(&inside);
+                    }
                 }
             }
+            let share = if node.area > 0.0 {
+                1.0 / node.area
+            } else {
+                0.0
+            };
+            self.radiosity[i] = power * share;
+            self.irradiance[i] = arriving * share;
+            self.intensity[number] = sum;
         }
     }
 }

@@ -58,6 +58,8 @@ pub struct Hierarchy {
 const STEP: f64 = 4.0;
 /// Refinements before the last, at most.
 const LOOSER: i32 = 4;
+/// Irradiance that is no more than this share of the mean is not resolved better than that.
+const BLACK: f64 = 1e-3;
 /// Gathering steps after the last refinement, at most, when no other limit is given.
 const MAX_STEPS: u64 = 10_000;
 
@@ -69,12 +71,12 @@ pub fn solve(
     observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Solution, SolveError> {
     let start = Instant::now();
-    let mut tree = Tree::new(scene, surfaces, spec)?;
+    let mut tree = Tree::new(scene, surfaces.clone(), spec)?;
     let mut report = Report {
         mesh_seconds: start.elapsed().as_secs_f64(),
         ..Report::default()
     };
-    let mut refiner = Refiner::new(scene, spec, &tree);
+    let mut refiner = Refiner::new(scene, &surfaces, spec, &mut tree);
     let emitted = tree.emitted_power();
     let mut field = Field::new(&tree);
     let most = spec.max_steps.unwrap_or(MAX_STEPS);
@@ -82,7 +84,9 @@ pub fn solve(
     for looser in (0..=LOOSER).rev() {
         let clock = Instant::now();
         let error = spec.error * STEP.powi(looser);
-        refiner.refine(&mut tree, &mut field, error * emitted.max_element());
+        // What few links make dark may be brighter than it seems.
+        let black = (BLACK * STEP.powi(looser)).min(0.25);
+        refiner.refine(&mut tree, &mut field, error, black);
         report.form_factor_seconds += clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         // Before the last refinement, it is enough to see where light goes.

@@ -3,15 +3,21 @@
 use super::estimate::{Estimate, estimate};
 use super::gather::Field;
 use super::tree::{Kind, NONE, Tree, TreeLink};
-use crate::radiosity::{Rgb64, SolveSpec};
+use crate::radiosity::lights::Others;
+use crate::radiosity::{Rgb64, SolveSpec, Surfaces};
 use crate::scene::Scene;
 use rayon::prelude::*;
 
 /// Edges of patches are not divided below this share of the size of the scene, unless a size is asked for.
 const MIN_SIZE: f64 = 1.0 / 256.0;
 
+/// Connections to lights that are no patches, per node.
+const CONNECTIONS: u32 = 64;
+
 pub struct Refiner<'a> {
     scene: &'a Scene,
+    others: Others<'a>,
+    seed: u64,
     min_size: f64,
     /// Pairs of receiver and sender that no light goes between yet.
     dormant: Vec<(u32, u32)>,
@@ -33,19 +39,91 @@ enum Fate {
 }
 
 impl<'a> Refiner<'a> {
-    pub fn new(scene: &'a Scene, spec: &SolveSpec, tree: &Tree) -> Refiner<'a> {
+    /// Also finds the light that comes from lights that are no patches.
+    pub fn new(
+        scene: &'a Scene,
+        surfaces: &'a Surfaces,
+        spec: &SolveSpec,
+        tree: &mut Tree,
+    ) -> Refiner<'a> {
         let size = 2.0 * tree.nodes[0].radius;
-        Refiner {
+        let refiner = Refiner {
             scene,
+            others: Others::new(scene, surfaces),
+            seed: spec.seed,
             min_size: spec.min_size.unwrap_or(size * MIN_SIZE),
             dormant: vec![(0, 0)],
             coarse: 0,
+        };
+        let cells = tree.cells.clone();
+        refiner.light(tree, &cells);
+        refiner
+    }
+
+    /// Finds the irradiance of surfaces from lights that are no patches.
+    fn light(&self, tree: &mut Tree, nodes: &[u32]) {
+        if self.others.is_empty() {
+            return;
+        }
+        let find = |&node: &u32| match tree.nodes[node as usize].kind {
+            Kind::Surface { facet, piece } => {
+                let number = u64::from(node);
+                self.others
+                    .irradiance(facet, &piece, CONNECTIONS, number, self.seed)
+            }
+            Kind::Cluster { .. } => Rgb64::ZERO,
+        };
+        let found: Vec<Rgb64> = nodes.par_iter().map(find).collect();
+        for (node, found) in nodes.iter().zip(found) {
+            tree.nodes[*node as usize].external = found;
         }
     }
 
-    /// Links all pairs of nodes so that no link errs by more than `threshold` W, judged by the light of `field`.
-    pub fn refine(&mut self, tree: &mut Tree, field: &mut Field, threshold: f64) {
+    /// Divides surfaces over which the light of lights that are no patches differs too much.
+    fn refine_external(&self, tree: &mut Tree, field: &mut Field, threshold: f64) {
+        if self.others.is_empty() {
+            return;
+        }
+        let mut nodes: Vec<u32> = tree.cells.clone();
+        while !nodes.is_empty() {
+            // Divided, then looked at: whether it was worth it shows in the quarters.
+            let large = |&&node: &&u32| {
+                let arriving = tree.nodes[node as usize].external.max_element();
+                weight(tree, field, node) * arriving > threshold
+            };
+            let large: Vec<u32> = nodes.iter().filter(large).copied().collect();
+            let mut next = Vec::new();
+            for node in large {
+                let known = !tree.children(node).is_empty();
+                if !tree.divide(self.scene, node, self.min_size) {
+                    continue;
+                }
+                field.grow(tree);
+                let quarters: Vec<u32> = tree.children(node).collect();
+                if !known {
+                    self.light(tree, &quarters);
+                }
+                next.extend(quarters);
+            }
+            // Only where quarters differ by more than chance makes them.
+            let differs = |&node: &u32| {
+                let n = &tree.nodes[node as usize];
+                let mean = tree.nodes[n.parent as usize].external;
+                let difference = (n.external - mean).max_element().abs();
+                let chance = 2.0 * mean.max_element() / f64::from(CONNECTIONS).sqrt();
+                weight(tree, field, node) * difference > threshold && difference > chance
+            };
+            next.retain(differs);
+            nodes = next;
+        }
+    }
+
+    /// Links all pairs of nodes so that no link errs by more than `threshold` (see [`errors`]), judged by the light
+    /// of `field`; what is darker than `black`, as a share of the mean, is no better than that.
+    pub fn refine(&mut self, tree: &mut Tree, field: &mut Field, threshold: f64, black: f64) {
         self.coarse = 0;
+        field.judge_by(tree, black);
+        self.refine_external(tree, field, threshold);
         let mut pairs = std::mem::take(&mut self.dormant);
         pairs.extend(self.reconsidered(tree, field, threshold));
         while !pairs.is_empty() {
@@ -100,7 +178,7 @@ impl<'a> Refiner<'a> {
             return Fate::Dormant;
         }
         // No form factor is larger than 1.
-        let most = receiver.area * receiver.albedo.max_element() * sent;
+        let most = weight(tree, field, r) * sent;
         if r == s && most > threshold {
             return Fate::Divided { sender: false };
         }
@@ -182,18 +260,31 @@ impl<'a> Refiner<'a> {
             }
             return;
         }
-        field.grow(tree);
+        if tree.nodes.len() > field.radiosity.len() {
+            field.grow(tree);
+            let quarters: Vec<u32> = tree.children(node).collect();
+            self.light(tree, &quarters);
+        }
         for child in tree.children(node) {
             next.push(if by_sender { (r, child) } else { (child, s) });
         }
     }
 }
 
-/// Errors of the power in W that a link brings and its receiver reflects: by the spread over the receiver, and by
-/// the differences of radiosity over the sender.
+/// What an error of the irradiance of node `r` in W/m² counts: its share of what arrives there usually, times the
+/// node's share of all area, times its reflectance in proportion to the scene's. So dark corners are as good as
+/// bright ones, and large surfaces better than small ones.
+fn weight(tree: &Tree, field: &Field, r: u32) -> f64 {
+    let (receiver, root) = (&tree.nodes[r as usize], &tree.nodes[0]);
+    let reflectance = receiver.albedo.max_element() / root.albedo.max_element();
+    let weight = receiver.area / root.area * reflectance / field.usual[r as usize];
+    if weight.is_finite() { weight } else { 0.0 }
+}
+
+/// Errors of the light that a link brings, as shares (see [`weight`]): by the spread over the receiver, and by the
+/// differences of radiosity over the sender.
 fn errors(tree: &Tree, field: &Field, r: u32, s: u32, found: &Estimate) -> [f64; 2] {
-    let receiver = &tree.nodes[r as usize];
-    let reflected = receiver.area * receiver.albedo.max_element();
+    let weight = weight(tree, field, r);
     let sent = field.radiosity[s as usize].max_element();
     let quarters = match tree.nodes[s as usize].kind {
         Kind::Surface { .. } => tree.children(s),
@@ -206,7 +297,7 @@ fn errors(tree: &Tree, field: &Field, r: u32, s: u32, found: &Estimate) -> [f64;
     }
     let varied = (most - least).max_element().max(0.0);
     [
-        reflected * found.spread * sent,
-        0.5 * reflected * found.form_factor * varied,
+        weight * found.spread * sent,
+        0.5 * weight * found.form_factor * varied,
     ]
 }

@@ -59,6 +59,10 @@ pub struct Tree {
     pub cells: Vec<u32>,
     /// Clusters come before what they contain; quarters after all that was there when they were made.
     pub nodes: Vec<TreeNode>,
+    /// Numbers of the clusters among each other, by node; `NONE` for cells.
+    pub clusters: Vec<u32>,
+    /// The nodes that are clusters.
+    pub by_cluster: Vec<u32>,
     pub patches: u64,
     pub max_patches: u64,
 }
@@ -100,7 +104,16 @@ impl Tree {
         };
         let roots: Vec<TreeNode> = pieces.par_iter().map(make).collect();
         let (nodes, cells) = cluster::build(roots);
+        let mut by_cluster = Vec::new();
+        let mut clusters = vec![NONE; nodes.len()];
+        for (i, node) in nodes.iter().enumerate().filter(|(_, n)| n.is_cluster()) {
+            debug_assert!(node.parent == NONE || (node.parent as usize) < i);
+            clusters[i] = by_cluster.len() as u32;
+            by_cluster.push(i as u32);
+        }
         Ok(Tree {
+            clusters,
+            by_cluster,
             surfaces,
             grids,
             cells,

@@ -1,7 +1,8 @@
 //! Gaussian elimination: one factorisation of I - ρ F per channel.
 
 use super::gathering::gather;
-use super::{Dense, Run, Solved, System};
+use super::{Run, Solved, System};
+use crate::radiosity::form_factors::Matrix;
 use crate::radiosity::{Progress, Rgb64, SolveError, Solver};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::lu::partial_pivoting::{factor, solve};
@@ -13,10 +14,10 @@ const PARTS: usize = 8;
 
 /// More radiosity than this over what was emitted says no more than that (almost) nothing is absorbed: form
 /// factors are not known that well.
-const MOST_GAIN: f64 = 1e9;
+const MOST_GAIN: f64 = 1e6;
 
 /// Solves with partial pivoting; the residual is that of the rounding.
-pub(super) fn eliminate(system: &System, f: &Dense, run: Run) -> Result<Solved, SolveError> {
+pub(super) fn eliminate(system: &System, f: &Matrix, run: Run) -> Result<Solved, SolveError> {
     let n = system.len();
     let albedo: Vec<Rgb64> = system.mesh.patches.iter().map(|p| p.albedo).collect();
     // Channels with the same albedos everywhere share a factorisation.
@@ -83,7 +84,7 @@ fn solve_in_place(mut matrix: Mat<f64>, sides: &mut Mat<f64>) {
 
 /// A solution with negative radiosity, or far more light than was emitted, is that of a scene in which light
 /// grows: where it fades, all of (I - ρ F)⁻¹ is positive.
-fn check(system: &System, f: &Dense, radiosity: &[Rgb64]) -> Result<(), SolveError> {
+fn check(system: &System, f: &Matrix, radiosity: &[Rgb64]) -> Result<(), SolveError> {
     let most = radiosity.iter().map(|b| b.max_element());
     let most = most.fold(0.0, f64::max);
     let rounding = -1e-9 * most;

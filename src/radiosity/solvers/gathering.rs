@@ -1,7 +1,8 @@
 //! Gathering: each patch takes in what all others have, sweep after sweep.
 
 use super::watch::Watch;
-use super::{Dense, Run, Solved, System};
+use super::{Run, Solved, System};
+use crate::radiosity::form_factors::Matrix;
 use crate::radiosity::{Progress, Rgb64, SolveError, Solver};
 use rayon::prelude::*;
 
@@ -10,7 +11,7 @@ use rayon::prelude::*;
 /// Each sweep divides the error by at least the largest ρ Σ_j F_ij, which is below 1 but where light cannot fade.
 pub(super) fn iterate(
     system: &System,
-    f: &Dense,
+    f: &Matrix,
     solver: Solver,
     run: Run,
 ) -> Result<Solved, SolveError> {
@@ -50,7 +51,7 @@ pub(super) fn at_rounding(system: &System, radiosity: &[Rgb64], change: f64) -> 
 }
 
 /// One step of Jacobi. Returns Σ A |change| over the channels: the residual of what was there before.
-fn all_at_once(system: &System, f: &Dense, radiosity: &mut Vec<Rgb64>) -> f64 {
+fn all_at_once(system: &System, f: &Matrix, radiosity: &mut Vec<Rgb64>) -> f64 {
     let patches = &system.mesh.patches;
     let next: Vec<Rgb64> = (0..f.n)
         .into_par_iter()
@@ -64,7 +65,7 @@ fn all_at_once(system: &System, f: &Dense, radiosity: &mut Vec<Rgb64>) -> f64 {
 }
 
 /// One sweep of Gauss and Seidel: every patch uses what those before it have just got.
-fn in_turn(system: &System, f: &Dense, radiosity: &mut [Rgb64]) -> f64 {
+fn in_turn(system: &System, f: &Matrix, radiosity: &mut [Rgb64]) -> f64 {
     let mut change = 0.0;
     for (i, patch) in system.mesh.patches.iter().enumerate() {
         let next = system.source[i] + patch.albedo * dot(f.row(i), radiosity);
@@ -92,7 +93,7 @@ fn dot(f: &[f64], x: &[Rgb64]) -> Rgb64 {
 /// residual is that of `radiosity`, which bounds that of the result.
 pub(super) fn gather(
     system: &System,
-    f: &Dense,
+    f: &Matrix,
     radiosity: &[Rgb64],
     steps: u64,
     wanted: f64,

@@ -1,11 +1,11 @@
 //! Solvers on a flat mesh of patches: B = E + ρ (e + F B), by elimination, by gathering and by shooting.
 //!
-//! They know form factors only as rows and columns of F ([`Exchange`]), and all solve the same equations: they
-//! agree up to the residual. Rows are taken as they are: those that sum to more than 1 are not scaled down in
+//! They know form factors only as rows of F ([`Exchange`]), and all solve the same equations, up to the residual, as
+//! far as A_i F_ij = A_j F_ji holds: gathering takes what row i says of those that give to i, shooting what it says
+//! of those that get from i. Rows are taken as they are: those that sum to more than 1 are not scaled down in
 //! silence; where light would grow for that reason, it is an error that says so.
 
 mod direct;
-mod factors;
 mod gathering;
 mod memory;
 mod shooting;
@@ -14,13 +14,13 @@ mod watch;
 #[cfg(test)]
 mod tests;
 
+use super::form_factors::{FormFactors, Matrix};
 use super::report::{self, Balance};
 use super::{
     PatchMesh, Progress, Report, Rgb64, Solution, SolveError, SolveSpec, Solver, Surfaces, lights,
     mesh,
 };
 use crate::scene::Scene;
-use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::Instant;
@@ -30,27 +30,24 @@ const PATCHES_OF_MATRIX: u64 = 2_000;
 const PATCHES_OF_SHOOTING: u64 = 10_000;
 
 /// A row that sums to more than 1 by this is worth a warning.
-const ROW_SUM_DOUBT: f64 = 1e-2;
+const ROW_SUM_DOUBT: f64 = 0.1;
 
-/// Form factors between n patches, as the solvers ask for them. Each is a pure function of its numbers.
+/// Form factors between patches, as the solvers ask for them. Each is a pure function of its numbers.
 pub(super) trait Exchange: Sync {
     /// F_ij for all j: the share of what leaves i that arrives at j.
     fn row(&self, i: u32, out: &mut [f64]);
 
-    /// F_ji for all j: times B_i, the irradiance that i gives to j.
-    fn column(&self, i: u32, out: &mut [f64]);
+    /// All rows.
+    fn matrix(&self) -> Matrix;
 }
 
-/// All form factors, row after row.
-pub(super) struct Dense {
-    pub n: usize,
-    pub f: Vec<f64>,
-}
+impl Exchange for FormFactors<'_> {
+    fn row(&self, i: u32, out: &mut [f64]) {
+        FormFactors::row(self, i, out);
+    }
 
-impl Dense {
-    /// `rows` in the order of their patches.
-    pub fn row(&self, i: usize) -> &[f64] {
-        &self.f[i * self.n..(i + 1) * self.n]
+    fn matrix(&self) -> Matrix {
+        FormFactors::matrix(self)
     }
 }
 
@@ -147,7 +144,8 @@ pub(super) fn solve(
     let start = Instant::now();
     let system = System::new(&mesh, lights::external(scene, &mesh, spec.seed));
     let run = Run {
-        residual: spec.residual,
+        // Not a number asks for as little as there can be.
+        residual: spec.residual.max(0.0),
         max_steps: spec.max_steps.unwrap_or(u64::MAX),
         observe,
     };
@@ -211,7 +209,7 @@ fn by_spec(
     spec: &SolveSpec,
     run: Run,
 ) -> Result<Solved, SolveError> {
-    let factors = factors::Lambert::new(scene, system.mesh);
+    let factors = FormFactors::new(scene, system.mesh, spec.form_factors, spec.seed);
     by_factors(system, &factors, spec, run)
 }
 
@@ -226,16 +224,11 @@ fn by_factors(
         return shooting::shoot(system, factors, spec.ambient, run);
     }
     let start = Instant::now();
-    let n = system.len();
-    let mut f = vec![0.0; n * n];
-    f.par_chunks_mut(n)
-        .enumerate()
-        .for_each(|(i, row)| factors.row(i as u32, row));
-    let dense = Dense { n, f };
+    let matrix = factors.matrix();
     let form_factor_seconds = start.elapsed().as_secs_f64();
     let solved = match spec.solver {
-        Solver::Gauss => direct::eliminate(system, &dense, run)?,
-        solver => gathering::iterate(system, &dense, solver, run)?,
+        Solver::Gauss => direct::eliminate(system, &matrix, run)?,
+        solver => gathering::iterate(system, &matrix, solver, run)?,
     };
     Ok(Solved {
         form_factor_seconds,

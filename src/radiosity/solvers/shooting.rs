@@ -8,11 +8,11 @@ use rayon::prelude::*;
 use std::collections::VecDeque;
 use std::time::Instant;
 
-/// Columns that are found at once when one is needed: those of the patches that are next by what they have now.
+/// Rows that are found at once when one is needed: those of the patches that are next by what they have now.
 /// A fixed number keeps all threads busy without letting their number matter.
 const AHEAD: usize = 16;
 
-/// Columns that are kept for patches that shoot again: memory stays in proportion to the number of patches.
+/// Rows that are kept for patches that shoot again: memory stays in proportion to the number of patches.
 const KEPT: usize = 512;
 
 /// Shoots until the light that was not shot is a small part of what was emitted: that part bounds the residual.
@@ -25,7 +25,7 @@ pub(super) fn shoot(
 ) -> Result<Solved, SolveError> {
     let patches = &system.mesh.patches;
     let mut state = State::new(system);
-    let mut columns = Columns::new(system.len());
+    let mut rows = Rows::new(system.len());
     let mut watch = Watch::new();
     let mut seconds = 0.0;
     let mut residual = system.relative(system.watts(&state.unshot).element_sum());
@@ -34,14 +34,14 @@ pub(super) fn shoot(
         let Some(shooter) = state.brightest(system) else {
             break;
         };
-        if !columns.has(shooter) {
+        if !rows.has(shooter) {
             let start = Instant::now();
             let ahead = (run.max_steps - steps).min(AHEAD as u64) as usize;
-            columns.find(factors, &state.next(system, shooter, ahead, &columns));
+            rows.find(factors, &state.next(system, shooter, ahead, &rows));
             seconds += start.elapsed().as_secs_f64();
         }
-        let column = columns.get(shooter);
-        state.shot(system, shooter, column);
+        let row = rows.get(shooter);
+        state.shot(system, shooter, row);
         steps += 1;
         let unshot = system.watts(&state.unshot);
         residual = system.relative(unshot.element_sum());
@@ -132,8 +132,8 @@ impl State {
         best.1
     }
 
-    /// `shooter`, and those that have most after it and whose columns are not known yet; `count` in all.
-    fn next(&self, system: &System, shooter: usize, count: usize, known: &Columns) -> Vec<usize> {
+    /// `shooter`, and those that have most after it and whose rows are not known yet; `count` in all.
+    fn next(&self, system: &System, shooter: usize, count: usize, known: &Rows) -> Vec<usize> {
         let wanted = |&i: &usize| i != shooter && !known.has(i) && self.power(system, i) > 0.0;
         let mut others: Vec<(f64, usize)> = (0..system.len())
             .filter(wanted)
@@ -151,8 +151,8 @@ impl State {
         first.chain(others.into_iter().map(|(_, i)| i)).collect()
     }
 
-    /// Sends all that patch `i` has to the others. `column` holds F_ji by j.
-    fn shot(&mut self, system: &System, i: usize, column: &[f64]) {
+    /// Sends all that patch `i` has to the others. `row` holds F_ij by j; F_ji = F_ij A_i / A_j.
+    fn shot(&mut self, system: &System, i: usize, row: &[f64]) {
         let sent = std::mem::take(&mut self.unshot[i]);
         let patches = &system.mesh.patches;
         // Light that was emitted is in the first shot, whole.
@@ -160,33 +160,34 @@ impl State {
             true => Rgb64::ZERO,
             false => patches[i].emission,
         };
-        let mut arrived = 0.0;
-        for (j, (patch, &f)) in patches.iter().zip(column).enumerate() {
+        let area = patches[i].area;
+        for (j, (patch, &f)) in patches.iter().zip(row).enumerate() {
             if f > 0.0 {
+                let f = f * (area / patch.area);
                 let irradiance = sent * f;
                 let reflected = patch.albedo * irradiance;
                 self.irradiance[j] += irradiance;
                 self.direct[j] += emitted * f;
                 self.radiosity[j] += reflected;
                 self.unshot[j] += reflected;
-                arrived += patch.area * f;
             }
         }
-        self.escaped += sent * (patches[i].area - arrived);
-        self.row_sum = self.row_sum.max(arrived / patches[i].area);
+        let sum: f64 = row.iter().sum();
+        self.escaped += sent * (area * (1.0 - sum));
+        self.row_sum = self.row_sum.max(sum);
     }
 }
 
-/// The columns that were found last.
-struct Columns {
+/// The rows that were found last.
+struct Rows {
     of: Vec<Option<Box<[f64]>>>,
     /// Oldest first.
     order: VecDeque<usize>,
 }
 
-impl Columns {
-    fn new(n: usize) -> Columns {
-        Columns {
+impl Rows {
+    fn new(n: usize) -> Rows {
+        Rows {
             of: vec![None; n],
             order: VecDeque::new(),
         }
@@ -211,13 +212,13 @@ impl Columns {
         let found: Vec<Box<[f64]>> = patches
             .par_iter()
             .map(|&i| {
-                let mut column = vec![0.0; n].into_boxed_slice();
-                factors.column(i as u32, &mut column);
-                column
+                let mut row = vec![0.0; n].into_boxed_slice();
+                factors.row(i as u32, &mut row);
+                row
             })
             .collect();
-        for (&i, column) in patches.iter().zip(found) {
-            self.of[i] = Some(column);
+        for (&i, row) in patches.iter().zip(found) {
+            self.of[i] = Some(row);
             self.order.push_back(i);
         }
     }

@@ -10,9 +10,9 @@ pub(super) struct Watch {
 /// Rounds between two looks: light that travels through white rooms loses nothing before it is there.
 const WINDOW: u32 = 100;
 
-/// Share of the residual that a window must take away: less would need more than 10⁹ rounds, and is not told
-/// from the error of form factors.
-const LEAST: f64 = 1e-7;
+/// Share of the residual that a window must take away: less than a millionth of the light fades in a round, which
+/// is not told from the error of form factors (see `direct::MOST_GAIN`).
+const LEAST: f64 = 1e-4;
 
 impl Watch {
     pub fn new() -> Watch {

@@ -244,7 +244,7 @@ impl<'a> Combined<'a> {
         reader.caustics = iteration.caustics.as_ref();
         let start = Start::at_camera(ray);
         let li = path.walk(scene, start, sampler, &mut ledger.rays, &mut reader);
-        ledger.bias += reader.bias;
+        ledger.fresh_bias = reader.bias;
         ledger.record(Technique::Merging, reader.found);
         ledger.record(Technique::Path, li.radiance - reader.found);
         li

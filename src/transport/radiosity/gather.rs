@@ -58,6 +58,15 @@ impl AddAssign for Bias {
 }
 
 impl Bias {
+    /// Of a picture that is brighter by `factor`.
+    pub fn scaled(self, factor: f64) -> Bias {
+        Bias {
+            sum: self.sum * factor,
+            sum_squares: self.sum_squares * factor * factor,
+            ..self
+        }
+    }
+
     /// Bias of the picture's mean luminance and its standard error, from `samples` of the picture's plane.
     pub fn mean(&self, samples: u64) -> Option<[f64; 2]> {
         if self.compared < 2 || samples < 2 {
@@ -268,7 +277,7 @@ impl<'a> CachedPath<'a> {
         let mut reader = Reader::<false>::new(scene, self.path, cache, Reads::ReflectedBehind);
         let start = Start::at_camera(ray);
         let li = (self.path).walk(scene, start, sampler, &mut ledger.rays, &mut reader);
-        ledger.bias += reader.bias;
+        ledger.fresh_bias = reader.bias;
         li
     }
 }

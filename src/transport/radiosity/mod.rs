@@ -19,7 +19,7 @@ pub use gather::Bias;
 pub(super) use gather::{CachedPath, Reader, Reads};
 pub(super) use guide::Guiding;
 pub use solved::Solved;
-pub(super) use solved::{Cache, Solving};
+pub(super) use solved::{Cache, Solving, Use};
 pub(super) use view::View;
 
 use super::PathSpec;
@@ -69,22 +69,25 @@ pub struct CachedSpec {
 
 /// How radiosity is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Display {
+pub enum Show {
     /// Each patch by its own irradiance: the patches are seen.
     Flat,
+    /// By irradiance interpolated between vertices that patches share (Gouraud 1971).
+    Gouraud,
     /// By what is sent to the point that is seen: light straight from emitters is sampled, and a ray for the rest
     /// reads the irradiance where it ends.
     #[default]
     Gather,
 }
 
-impl Display {
-    pub const ALL: [Display; 2] = [Display::Flat, Display::Gather];
+impl Show {
+    pub const ALL: [Show; 3] = [Show::Flat, Show::Gouraud, Show::Gather];
 
     pub fn name(self) -> &'static str {
         match self {
-            Display::Flat => "flat",
-            Display::Gather => "gather",
+            Show::Flat => "flat",
+            Show::Gouraud => "gouraud",
+            Show::Gather => "gather",
         }
     }
 }
@@ -96,7 +99,7 @@ pub struct RadiositySpec {
     /// edges.
     pub path: PathSpec,
     pub solve: SolveSpec,
-    pub show: Display,
+    pub show: Show,
     /// What is shown, if it is known already.
     pub given: Option<Solved>,
 }
@@ -138,46 +141,44 @@ impl CacheSpec {
         if self.indirect == Indirect::None {
             return None;
         }
-        let (decision, reason) = match self.is_used(scene, path) {
-            Err(why) => ("none, nothing is solved", why),
-            Ok(()) if self.indirect == Indirect::Guide => (
-                "solved once, guides walks from diffuse surfaces",
-                "diffuse surfaces light each other",
-            ),
-            Ok(()) => (
-                "solved once, read where a walk meets a second diffuse surface",
-                "diffuse surfaces light each other",
-            ),
-        };
-        let solver = self.solve.solver.name();
-        let decision = match self.is_used(scene, path) {
-            Ok(()) => format!("{decision}; solver {solver}"),
-            Err(_) => decision.to_string(),
-        };
-        Some(PlanEntry {
-            subject: "radiosity",
-            decision,
-            reason: reason.to_string() + lost(scene),
-        })
+        Some(entry(self.is_used(scene, path), scene, || {
+            let solver = self.solve.solver.name();
+            let used = match self.indirect {
+                Indirect::Guide => "sends walks from diffuse surfaces where their light comes from",
+                _ => "read where a walk meets a second diffuse surface",
+            };
+            format!("solved once (solver {solver}), {used}")
+        }))
     }
 }
 
 impl RadiositySpec {
     /// What is done in `scene`, and why.
     pub fn plan(&self, scene: &Scene) -> PlanEntry {
-        let solver = self.solve.solver.name();
-        let (decision, reason) = match view::is_used(scene) {
-            Err(why) => ("nothing is solved".to_string(), why),
-            Ok(()) => (
-                format!("shown {}; solver {solver}", self.show.name()),
-                "there are diffuse surfaces and emitters",
-            ),
-        };
-        PlanEntry {
-            subject: "radiosity",
-            decision,
-            reason: reason.to_string() + lost(scene),
-        }
+        entry(view::is_used(scene), scene, || {
+            let solver = self.solve.solver.name();
+            format!("solved once (solver {solver}), shown {}", self.show.name())
+        })
+    }
+}
+
+/// The plan's entry on radiosity.
+fn entry(
+    used: Result<(), &'static str>,
+    scene: &Scene,
+    decision: impl FnOnce() -> String,
+) -> PlanEntry {
+    let (decision, reason) = match used {
+        Ok(()) => (
+            decision(),
+            "diffuse surfaces light each other".to_string() + lost(scene),
+        ),
+        Err(why) => ("none, nothing is solved".to_string(), why.to_string()),
+    };
+    PlanEntry {
+        subject: "radiosity",
+        decision,
+        reason,
     }
 }
 

@@ -7,7 +7,9 @@ use std::time::Instant;
 use super::{CacheSpec, Indirect};
 use crate::geom::Hit;
 use crate::math::Rgb;
-use crate::radiosity::{self, Guide, Progress, Report, Rgb64, Solution, SolveError, SolveSpec};
+use crate::radiosity::{
+    self, Display, Guide, Progress, Report, Rgb64, Solution, SolveError, SolveSpec,
+};
 use crate::scene::Scene;
 
 /// A solution that is known already. Two are equal if they are the same one.
@@ -26,10 +28,30 @@ pub struct Cache {
     /// Irradiance of each patch in W/m²: all of it, and what diffuse surfaces have reflected before.
     total: Vec<Rgb>,
     reflected: Vec<Rgb>,
+    /// The same between vertices; `None` where patches are to be seen.
+    smooth: Option<Smooth>,
     /// Squared distance from a patch, in scene units, within which its irradiance is too coarse to be seen.
     near2: Vec<f32>,
-    /// Where light comes from, if walks are to be guided.
+    /// Where light comes from, if walks are guided.
     pub guide: Option<Guide>,
+}
+
+/// Irradiance interpolated between the vertices of patches.
+struct Smooth {
+    display: Display,
+    total: Vec<Rgb64>,
+    reflected: Vec<Rgb64>,
+}
+
+/// What a solution is made ready for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Use {
+    /// Irradiance is read, the same all over a patch.
+    Flat,
+    /// Irradiance is read, interpolated within surfaces.
+    Smooth,
+    /// Walks are guided.
+    Guide,
 }
 
 /// What is read at a hit.
@@ -41,22 +63,30 @@ pub struct Read {
 }
 
 impl Cache {
-    pub fn new(solution: Arc<Solution>, scene: &Scene, guides: bool) -> Cache {
-        let rgb = |c: Rgb64| Rgb::from_array(c.to_array().map(|v| v.max(0.0) as f32));
+    pub fn new(solution: Arc<Solution>, scene: &Scene, made_for: Use) -> Cache {
         let diagonal = scene.world().bounds().diagonal().length();
         let most = (NEAR * diagonal).powi(2);
+        let patches = 0..solution.mesh.len() as u32;
+        let reflected: Vec<Rgb64> = patches.map(|i| solution.indirect(i)).collect();
+        let interpolated = || {
+            let display = Display::new(scene, &solution.mesh);
+            Smooth {
+                total: display.vertex_values(&solution.irradiance),
+                reflected: display.vertex_values(&reflected),
+                display,
+            }
+        };
         Cache {
+            smooth: (made_for == Use::Smooth).then(interpolated),
+            guide: match made_for {
+                Use::Guide => Guide::new(scene, Arc::clone(&solution)),
+                _ => None,
+            },
             total: solution.irradiance.iter().map(|e| rgb(*e)).collect(),
-            reflected: (0..solution.mesh.len() as u32)
-                .map(|i| rgb(solution.indirect(i)))
-                .collect(),
+            reflected: reflected.iter().map(|e| rgb(*e)).collect(),
             near2: (solution.mesh.patches.iter())
                 .map(|p| most.min(p.area as f32))
                 .collect(),
-            guide: match guides {
-                true => Guide::new(scene, Arc::clone(&solution)),
-                false => None,
-            },
             solution,
         }
     }
@@ -64,23 +94,32 @@ impl Cache {
     /// All irradiance at `hit`; `None` where the surface has no patch.
     #[inline]
     pub fn total(&self, hit: &Hit) -> Option<Read> {
-        self.read(hit, &self.total)
+        self.read(hit, &self.total, |smooth| &smooth.total)
     }
 
     /// The same without light straight from emitters.
     #[inline]
     pub fn reflected(&self, hit: &Hit) -> Option<Read> {
-        self.read(hit, &self.reflected)
+        self.read(hit, &self.reflected, |smooth| &smooth.reflected)
     }
 
     #[inline]
-    fn read(&self, hit: &Hit, values: &[Rgb]) -> Option<Read> {
-        let patch = self.solution.mesh.locate(hit)?.patch as usize;
+    fn read(&self, hit: &Hit, flat: &[Rgb], smooth: fn(&Smooth) -> &[Rgb64]) -> Option<Read> {
+        let mesh = &self.solution.mesh;
+        let at = mesh.locate(hit)?;
+        let patch = at.patch as usize;
         Some(Read {
-            irradiance: values[patch],
+            irradiance: match &self.smooth {
+                Some(by) => rgb(by.display.at(mesh, smooth(by), at)),
+                None => flat[patch],
+            },
             near2: self.near2[patch],
         })
     }
+}
+
+fn rgb(c: Rgb64) -> Rgb {
+    Rgb::from_array(c.to_array().map(|v| v.max(0.0) as f32))
 }
 
 /// A patch is never too coarse from further away than this share of the scene's diagonal, however large it is: it is
@@ -92,27 +131,33 @@ pub struct Solving<'a> {
     scene: &'a Scene,
     spec: &'a SolveSpec,
     given: Option<&'a Solved>,
-    guides: bool,
+    made_for: Use,
     made: OnceLock<Result<Option<Cache>, SolveError>>,
 }
 
 impl<'a> Solving<'a> {
-    pub fn new(scene: &'a Scene, spec: &'a SolveSpec, given: Option<&'a Solved>) -> Solving<'a> {
+    pub fn new(
+        scene: &'a Scene,
+        spec: &'a SolveSpec,
+        given: Option<&'a Solved>,
+        made_for: Use,
+    ) -> Solving<'a> {
         Solving {
+            made_for,
             scene,
             spec,
             given,
-            guides: false,
             made: OnceLock::new(),
         }
     }
 
-    /// What `cache` asks for.
+    /// What a path tracer makes of radiosity.
     pub fn of(scene: &'a Scene, cache: &'a CacheSpec) -> Solving<'a> {
-        Solving {
-            guides: cache.indirect == Indirect::Guide,
-            ..Solving::new(scene, &cache.solve, cache.given.as_ref())
-        }
+        let made_for = match cache.indirect {
+            Indirect::Guide => Use::Guide,
+            Indirect::None | Indirect::Gather => Use::Smooth,
+        };
+        Solving::new(scene, &cache.solve, cache.given.as_ref(), made_for)
     }
 
     /// Solves, on all threads of the current pool, unless that is done. `observe` sees every step and may stop the
@@ -141,7 +186,9 @@ impl<'a> Solving<'a> {
                 Err(error) => return Err(error),
             },
         };
-        Ok(Some(Cache::new(solution, self.scene, self.guides)))
+        let cache = Cache::new(solution, self.scene, self.made_for);
+        // Without links, nothing to be guided by.
+        Ok((self.made_for != Use::Guide || cache.guide.is_some()).then_some(cache))
     }
 
     /// The solution, once [`Solving::prepare`] has made it; `None` where there is nothing to read.

@@ -5,7 +5,7 @@
 //! one or, for a final gather, at the next one that a ray from there meets.
 
 use super::gather::{Reader, Reads};
-use super::{Display, RadiositySpec, Solving};
+use super::{RadiositySpec, Show, Solving, Use};
 use crate::geom::Ray;
 use crate::sampler::Sampler;
 use crate::scene::Scene;
@@ -32,7 +32,11 @@ pub struct View<'a> {
 impl<'a> View<'a> {
     pub fn new(spec: &'a RadiositySpec, setting: Setting<'a>) -> View<'a> {
         let scene = setting.scene;
-        let solving = || Solving::new(scene, &spec.solve, spec.given.as_ref());
+        let made_for = match spec.show {
+            Show::Flat => Use::Flat,
+            _ => Use::Smooth,
+        };
+        let solving = || Solving::new(scene, &spec.solve, spec.given.as_ref(), made_for);
         View {
             spec,
             setting,
@@ -45,8 +49,8 @@ impl<'a> View<'a> {
     pub fn sample(&self, ray: Ray, sampler: &Sampler, ledger: &mut Ledger) -> Li {
         let cache = self.solving.as_ref().and_then(Solving::get);
         let reads = match self.spec.show {
-            Display::Flat => Reads::All,
-            Display::Gather => Reads::AllBehind,
+            Show::Flat | Show::Gouraud => Reads::All,
+            Show::Gather => Reads::AllBehind,
         };
         let mut reader = Reader::<false>::new(self.setting.scene, &self.spec.path, cache, reads);
         let (scene, start) = (self.setting.scene, Start::at_camera(ray));

@@ -3,7 +3,7 @@
 use crate::format::compile::{on_command_line, suggest};
 use crate::format::{Overrides, Props, SceneError};
 use crate::radiosity::{FormFactorMethod, SolveSpec, Solver};
-use crate::transport::radiosity::{Display, GUIDE_ERROR, Indirect};
+use crate::transport::radiosity::{GUIDE_ERROR, Indirect, Show};
 use crate::transport::{CacheSpec, IntegratorSpec, PathSpec, RadiositySpec};
 
 /// Parameters that only a solution needs.
@@ -91,7 +91,7 @@ fn form_factors(props: &Props) -> Result<FormFactorMethod, SceneError> {
 /// The integrator "radiosity".
 pub fn shown(props: &Props, path: PathSpec) -> Result<IntegratorSpec, SceneError> {
     let show = props.string("show")?;
-    let show = Display::ALL.into_iter().find(|d| d.name() == show);
+    let show = Show::ALL.into_iter().find(|d| d.name() == show);
     Ok(IntegratorSpec::Radiosity(RadiositySpec {
         path,
         solve: solve(props)?,

@@ -1,0 +1,128 @@
+//! Pictures of a solution on its way.
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use super::args::{RadiosityArgs, Show};
+use crate::cli::Failure;
+use crate::cli::render::scene_name;
+use crate::radiosity::{Patch, Progress, Report, Rgb64, Solution};
+use crate::render::{Job, Metadata, Stop};
+use crate::transport::radiosity as shown;
+use crate::transport::radiosity::Solved;
+use crate::transport::{IntegratorSpec, RadiositySpec};
+
+/// Renders what a solver has found by certain steps.
+pub(super) struct Snapshots {
+    folder: PathBuf,
+    steps: Vec<u64>,
+    job: Job,
+    stop: Stop,
+    show: shown::Show,
+    metadata: Metadata,
+    last: Option<u64>,
+    spent: Duration,
+    written: usize,
+}
+
+impl Snapshots {
+    /// `job` has the scene that is solved; what it renders with is replaced.
+    pub fn new(
+        folder: &Path,
+        args: &RadiosityArgs,
+        job: Job,
+        command_line: &str,
+    ) -> Result<Snapshots, Failure> {
+        std::fs::create_dir_all(folder).map_err(|e| {
+            Failure::Output(format!("cannot make the folder {}: {e}", folder.display()))
+        })?;
+        Ok(Snapshots {
+            folder: folder.to_path_buf(),
+            steps: args.snapshot_steps.clone(),
+            job,
+            stop: Stop::Spp(args.snapshot_spp),
+            show: match args.show {
+                Show::Flat => shown::Show::Flat,
+                Show::Gouraud => shown::Show::Gouraud,
+            },
+            metadata: Metadata {
+                scene: scene_name(args.scene.as_deref()),
+                command_line: command_line.to_string(),
+                ..Metadata::default()
+            },
+            last: None,
+            spent: Duration::ZERO,
+            written: 0,
+        })
+    }
+
+    /// Writes a picture if one of this step is wanted; `ambient`: with light that is not shot yet as if it were
+    /// everywhere.
+    pub fn see(&mut self, progress: &Progress, ambient: bool) -> Result<(), Failure> {
+        if !self.steps.contains(&progress.step) {
+            return Ok(());
+        }
+        let everywhere = match ambient {
+            true => progress.ambient,
+            false => Rgb64::ZERO,
+        };
+        let arrived = |(patch, b): (&Patch, &Rgb64)| {
+            let reflected = *b - patch.emission;
+            let e = reflected / patch.albedo;
+            // Where nothing is reflected, what arrives cannot be seen.
+            Rgb64::select(patch.albedo.cmpgt(Rgb64::ZERO), e, Rgb64::ZERO).max(Rgb64::ZERO)
+                + everywhere
+        };
+        let patches = progress.mesh.patches.iter().zip(progress.radiosity);
+        let irradiance: Vec<Rgb64> = patches.map(arrived).collect();
+        let solution = Solution {
+            mesh: progress.mesh.clone(),
+            radiosity: progress.radiosity.to_vec(),
+            direct: vec![Rgb64::ZERO; irradiance.len()],
+            irradiance,
+            hierarchy: None,
+            report: Report::default(),
+        };
+        self.write(Arc::new(solution), progress.step)
+    }
+
+    /// Writes the picture of the result.
+    pub fn finish(&mut self, solution: &Arc<Solution>) -> Result<(), Failure> {
+        let step = solution.report.steps;
+        match self.last == Some(step) && !self.steps.is_empty() {
+            true => Ok(()),
+            false => self.write(Arc::clone(solution), step),
+        }
+    }
+
+    /// Time that the pictures took.
+    pub fn spent(&self) -> Duration {
+        self.spent
+    }
+
+    pub fn written(&self) -> usize {
+        self.written
+    }
+
+    fn write(&mut self, solution: Arc<Solution>, step: u64) -> Result<(), Failure> {
+        let start = Instant::now();
+        self.job.integrator = IntegratorSpec::Radiosity(RadiositySpec {
+            show: self.show,
+            given: Some(Solved(solution)),
+            ..RadiositySpec::default()
+        });
+        let rendered = self.job.render(self.stop, |_, _| ControlFlow::Continue(()));
+        let (film, stats) = rendered.map_err(|e| Failure::Input(e.to_string()))?;
+        let image = self.job.picture(&film, &stats, &self.metadata);
+        for extension in ["exr", "png"] {
+            let name = format!("step-{step:06}.{extension}");
+            image.write(self.folder.join(name))?;
+        }
+        self.last = Some(step);
+        self.written += 1;
+        self.spent += start.elapsed();
+        Ok(())
+    }
+}

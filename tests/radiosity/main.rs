@@ -1,0 +1,11 @@
+//! Radiosity on flat meshes: solvers against closed forms and each other, surfaces against what rays meet, and
+//! scenes that are not meant well.
+
+#[path = "../common/render.rs"]
+mod render;
+
+mod external;
+mod extremes;
+mod rooms;
+mod solvers;
+mod surfaces;
