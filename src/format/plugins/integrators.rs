@@ -85,7 +85,7 @@ const INDIRECT: Param = Param::choice(
     "indirect",
     &["none", "gather", "guide"],
     "none",
-    "Light between diffuse surfaces: none, walks find it; gather, read from radiosity where a walk meets a second diffuse surface (biased); luxel only.",
+    "Light between diffuse surfaces: none, walks find it; gather, read from radiosity where a walk meets a second diffuse surface (biased); guide, radiosity sends walks where it comes from (unbiased); luxel only.",
 );
 const SOLVER: Param = Param::choice(
     "solver",
