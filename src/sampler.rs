@@ -27,6 +27,8 @@ pub mod dim {
     pub const DIRECTIONS: u32 = 0;
     /// Choice of the light (1), of the lobe (1), Russian roulette (1), of the material (1).
     pub const CHOICES: u32 = 1;
+    /// Choice of the patch that the walk is sent to, in two parts (2).
+    pub const PATCH: u32 = 2;
 }
 
 /// How the points of a pixel are laid out.

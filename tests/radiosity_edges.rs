@@ -8,7 +8,9 @@ use luxel::math::{DVec2, DVec3};
 use luxel::radiosity::discontinuity::{self, Found, Kind, Limits, Line};
 use luxel::radiosity::mesh::Division;
 use luxel::radiosity::triangulation::{Order, Triangulation};
-use luxel::radiosity::{Outline, PatchMesh, Piece, Surfaces};
+use luxel::radiosity::{
+    FormFactorMethod, Outline, PatchMesh, Piece, Progress, SolveSpec, Solver, Surfaces,
+};
 use luxel::scene::Scene;
 use std::sync::Arc;
 
@@ -94,11 +96,11 @@ fn assert_found(triangles: &Triangulation, outline: Outline) {
         // The additive recurrence of the plastic number: spread evenly.
         let u = DVec2::new(0.754_877_666, 0.569_840_291) * f64::from(i);
         let st = outline.sample(DVec2::new(u.x.fract(), u.y.fract()));
-        let found = triangles.locate(st);
-        let corners = triangles.triangles[(found.patch - triangles.first) as usize];
+        let (index, inside) = triangles.locate(st);
+        let corners = triangles.triangles[index as usize];
         let back = corners[0]
-            + (corners[1] - corners[0]) * found.st.x
-            + (corners[2] - corners[0]) * found.st.y;
+            + (corners[1] - corners[0]) * inside.x
+            + (corners[2] - corners[0]) * inside.y;
         assert!(back.distance(st) < 1e-9, "{st} {back}");
     }
 }
@@ -107,8 +109,8 @@ fn assert_found(triangles: &Triangulation, outline: Outline) {
 fn assert_not_straddled(triangles: &Triangulation, line: &Line, tolerance: f64) {
     for t in 1..64 {
         let st = line.ends[0].lerp(line.ends[1], f64::from(t) / 64.0);
-        let found = triangles.locate(st);
-        let [a, b, c] = triangles.triangles[(found.patch - triangles.first) as usize];
+        let (index, _) = triangles.locate(st);
+        let [a, b, c] = triangles.triangles[index as usize];
         let near = [(a, b), (b, c), (c, a)].iter().any(|(p, q)| {
             let d = *q - *p;
             let along = (st - *p).dot(d) / d.length_squared();
@@ -375,6 +377,59 @@ fn large_scenes_meet_limits_and_say_so() {
     assert_eq!(found.left_out.curved, 1);
     assert!(found.left_out.short_edges > 100_000, "{found:?}");
     assert!(!found.warnings().is_empty());
+}
+
+/// The solution on the floor under the table: area of patches whose middle no lamp shines on, in units of the true
+/// one, and the most direct irradiance of these, in units of the most on the floor.
+fn darkness(scene: &Scene, spec: &SolveSpec) -> (f64, f64) {
+    let go = |_: &Progress| std::ops::ControlFlow::Continue(());
+    let solution = luxel::radiosity::solve(scene, spec, &mut { go }).unwrap();
+    let floor = floor_of(&solution.mesh.surfaces);
+    let facet = &solution.mesh.surfaces.facets()[floor].piece;
+    let (mut area, mut dark, mut leak, mut most) = (0.0, 0.0, 0.0_f64, 0.0_f64);
+    for (i, patch) in solution.mesh.patches.iter().enumerate() {
+        if patch.facet as usize != floor {
+            continue;
+        }
+        area += patch.area;
+        let middle = patch.piece.center();
+        let st = facet.locate(middle);
+        let hit = solution.mesh.surfaces.hit(scene, floor as u32, st);
+        assert_eq!(solution.mesh.locate(&hit).unwrap().patch as usize, i);
+        most = most.max(solution.direct[i].x);
+        // From the far corners of the lamp, edges at 0.5 fall on 0.65.
+        if middle.abs().max_element() < 0.65 {
+            dark += patch.area;
+            leak = leak.max(solution.direct[i].x);
+        }
+    }
+    assert!((area / facet.area() - 1.0).abs() < 1e-9, "{area}");
+    (dark / (1.3 * 1.3), leak / most)
+}
+
+#[test]
+fn no_light_leaks_under_a_table_with_any_solver() {
+    let scene = built(&table(), 1.0);
+    for solver in [Solver::Hierarchical, Solver::Shooting, Solver::GaussSeidel] {
+        let spec = SolveSpec {
+            solver,
+            form_factors: FormFactorMethod::Analytic { samples: 16 },
+            patch_size: Some(0.4),
+            min_size: Some(0.2),
+            discontinuities: true,
+            ..SolveSpec::default()
+        };
+        let (dark, leak) = darkness(&scene, &spec);
+        assert!((dark - 1.0).abs() < 0.01, "{solver:?}: {dark}");
+        // Points snap within a hundredth of a patch.
+        assert!(leak < 1e-3, "{solver:?}: {leak}");
+        let without = SolveSpec {
+            discontinuities: false,
+            ..spec
+        };
+        let (dark, leak) = darkness(&scene, &without);
+        assert!((dark - 1.0).abs() > 0.05 || leak > 1e-2, "{dark} {leak}");
+    }
 }
 
 /// Draws what `LUXEL_MESH` names to `LUXEL_MESH_OUT`: each cut facet as a picture, lines thick.

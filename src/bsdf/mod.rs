@@ -263,6 +263,8 @@ impl Bsdf {
             Bsdf::Diffuse(b) => b.albedo,
             Bsdf::Plastic(b) => b.diffuse_albedo(),
             Bsdf::RoughPlastic(b) => b.diffuse_albedo(),
+            Bsdf::Principled(b) => b.diffuse_albedo(),
+            Bsdf::PrincipledThin(b) => b.diffuse_albedo(),
             _ => Rgb::BLACK,
         }
     }

@@ -37,7 +37,7 @@ pub struct Located {
 pub enum Division {
     /// Equal cells side by side, each divided further on its own.
     Grid(Grid),
-    /// Triangles that follow lines across the facet.
+    /// Triangles that follow lines across the facet, each divided further on its own.
     Triangles(Box<Triangulation>),
 }
 
@@ -50,7 +50,7 @@ pub struct Grid {
     pub first: u32,
 }
 
-/// A square or triangle of a grid: a patch, or four cells.
+/// A square or triangle of a division: a patch, or four cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cell {
     Patch(u32),
@@ -170,23 +170,28 @@ impl PatchMesh {
         let facet = &self.surfaces.facets()[number as usize];
         let outline = facet.piece.outline;
         let st = outline.clamp(facet.piece.locate(hit.p.as_dvec3()));
-        match &self.divisions[number as usize] {
-            Division::Triangles(triangles) => Some(triangles.locate(st)),
+        // A cell, its form, and the place in it.
+        let (cell, outline, mut st) = match &self.divisions[number as usize] {
+            Division::Triangles(triangles) => {
+                let (index, inside) = triangles.locate(st);
+                (triangles.first + index, Outline::Triangle, inside)
+            }
             Division::Grid(grid) => {
-                let (index, mut st) = grid.locate(outline, st);
-                let mut cell = self.cells[(grid.first + index) as usize];
-                loop {
-                    match cell {
-                        Cell::Patch(patch) => {
-                            let st = outline.clamp(st);
-                            return Some(Located { patch, st });
-                        }
-                        Cell::Split(first) => {
-                            let (child, inside) = outline.child_at(st);
-                            cell = self.cells[first as usize + child];
-                            st = inside;
-                        }
-                    }
+                let (index, inside) = grid.locate(outline, st);
+                (grid.first + index, outline, inside)
+            }
+        };
+        let mut cell = self.cells[cell as usize];
+        loop {
+            match cell {
+                Cell::Patch(patch) => {
+                    let st = outline.clamp(st);
+                    return Some(Located { patch, st });
+                }
+                Cell::Split(first) => {
+                    let (child, inside) = outline.child_at(st);
+                    cell = self.cells[first as usize + child];
+                    st = inside;
                 }
             }
         }

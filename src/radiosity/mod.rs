@@ -12,6 +12,7 @@ pub mod discontinuity;
 pub mod display;
 pub mod export;
 pub mod form_factors;
+pub mod guide;
 pub mod hierarchy;
 pub mod lights;
 pub mod mesh;
@@ -25,6 +26,7 @@ pub mod triangulation;
 
 pub use display::Display;
 pub use form_factors::FormFactors;
+pub use guide::Guide;
 pub use hierarchy::Hierarchy;
 pub use mesh::{Located, Patch, PatchMesh};
 pub use piece::{Outline, Piece};

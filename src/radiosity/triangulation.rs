@@ -1,6 +1,5 @@
 //! A facet divided into triangles of any form.
 
-use super::mesh::Located;
 use super::piece::Outline;
 use crate::math::DVec2;
 
@@ -18,7 +17,8 @@ pub enum Order {
 pub struct Triangulation {
     /// Corners of each, counter-clockwise.
     pub triangles: Vec<[DVec2; 3]>,
-    /// Number of the patch that the first triangle is; the others follow.
+    /// Number of the first triangle's cell in the mesh; the others follow. Where cells are not divided further, as
+    /// in [`discontinuity::mesh`](super::discontinuity::mesh), patches have the numbers of their cells.
     pub first: u32,
     /// Numbers of the corners: triangles that share a corner have the same number there.
     pub corners: Vec<[u32; 3]>,
@@ -68,9 +68,9 @@ impl Triangulation {
         }
     }
 
-    /// The triangle at `st`, or the nearest one by its weights: looks at the few that reach into the cell of a
-    /// grid.
-    pub fn locate(&self, st: DVec2) -> Located {
+    /// The index of the triangle at `st`, or of the nearest one by its weights, and where in the triangle that is:
+    /// looks at the few that reach into the same cell of a grid.
+    pub fn locate(&self, st: DVec2) -> (u32, DVec2) {
         let scaled = st * f64::from(self.cells);
         let index = |x: f64| (x as u32).min(self.cells.saturating_sub(1));
         let cell = (index(scaled.y) * self.cells + index(scaled.x)) as usize;
@@ -88,10 +88,7 @@ impl Triangulation {
             }
             false => (i, inside),
         };
-        Located {
-            patch: self.first + i as u32,
-            st: Outline::Triangle.clamp(inside),
-        }
+        (i as u32, Outline::Triangle.clamp(inside))
     }
 
     /// The triangle that `st` is deepest in: its smallest weight, number and the place in it.

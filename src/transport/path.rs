@@ -156,7 +156,7 @@ pub(super) trait Gather {
     /// Share of the samples of [`Gather::scatter`] at `vertex` that come from the BSDF, as far as directions to
     /// emitters are concerned.
     #[inline]
-    fn bsdf_share(&self, _vertex: &Vertex) -> f32 {
+    fn bsdf_share(&mut self, _vertex: &Vertex) -> f32 {
         1.0
     }
 
@@ -172,10 +172,32 @@ pub(super) trait Gather {
         let sample = vertex.shading.sample(u_lobe, u, Mode::Radiance)?;
         Some(Onward { sample, met: None })
     }
+
+    /// Whether [`Gather::survival`] may end a walk before roulette is played by default.
+    const ENDS_EARLY: bool = false;
+
+    /// Probability, greater than 0, that the walk goes on along an edge that was chosen: `throughput` is what the
+    /// radiance along it counts for, `eta2` the squared relative index of refraction that it came through, `met`
+    /// what it meets, where that is known. `roulette`: by default it is played.
+    #[inline]
+    fn survival(
+        &mut self,
+        throughput: Rgb,
+        eta2: f32,
+        _met: Option<&Option<Hit>>,
+        roulette: bool,
+    ) -> f32 {
+        match roulette {
+            true => (throughput.max_component() * eta2).min(0.95),
+            false => 1.0,
+        }
+    }
 }
 
 /// The next edge of a walk.
 pub(super) struct Onward {
+    /// Its density is that of the BSDF times [`Gather::bsdf_share`]: what counts where it meets an emitter. The
+    /// weight is by the density of all ways to find it.
     pub sample: BsdfSample,
     /// What it meets (`Some(None)`: nothing), where that was found out on the way.
     pub met: Option<Option<Hit>>,
@@ -289,7 +311,8 @@ impl PathSpec {
                 straight = false;
                 seen = true;
             }
-            let any_choice = roulette || scene.lights_are_chosen() || shading.bsdf.has_lobes();
+            let any_choice =
+                roulette || G::ENDS_EARLY || scene.lights_are_chosen() || shading.bsdf.has_lobes();
             let u = numbers.draw(any_choice);
             let mut settled = false;
             let lit = !shading.bsdf.is_delta() && scene.has_lights();
@@ -367,8 +390,8 @@ impl PathSpec {
             }
             throughput *= sample.weight;
             eta2 *= sample.eta * sample.eta;
-            if roulette {
-                let survival = (throughput.max_component() * eta2).min(0.95);
+            if roulette || G::ENDS_EARLY {
+                let survival = gather.survival(throughput, eta2, met.as_ref(), roulette);
                 if u.roulette >= survival {
                     break;
                 }

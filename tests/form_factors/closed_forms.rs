@@ -141,7 +141,7 @@ fn curved() -> Vec<Case> {
 
 fn check(cases: &[Case], method: FormFactorMethod, tolerance: f64) {
     for case in cases {
-        let found = case.room.from_first(method, 1);
+        let found = case.room.first_to_others(method, 1);
         let off = found / case.expected - 1.0;
         println!(
             "{method:?} {}: {found} {} {off:e}",
@@ -183,11 +183,12 @@ fn monte_carlo_is_unbiased() {
     const SEEDS: u32 = 24;
     let cases = rectangles().into_iter().map(|case| (case, 192));
     // The sum over many small patches errs less.
-    for (case, samples) in cases.chain(curved().into_iter().map(|case| (case, 4))) {
+    let ball = curved().pop();
+    for (case, samples) in cases.chain(ball.into_iter().map(|case| (case, 24))) {
         let mut seed = 0;
         let (mean, error) = crate::common::mean_and_error(SEEDS, || {
             seed += 1;
-            case.room.from_first(MonteCarlo { samples }, seed)
+            case.room.first_to_others(MonteCarlo { samples }, seed)
         });
         let expected = case.expected;
         println!("{}: {mean} +- {error}, {expected}", case.name);

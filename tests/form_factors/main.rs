@@ -9,3 +9,4 @@ mod extremes;
 mod identities;
 mod rates;
 mod rooms;
+mod sight;

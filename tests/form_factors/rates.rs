@@ -24,7 +24,8 @@ fn slope(name: &str, counts: &[u32], error: impl Fn(u32) -> f64) -> f64 {
 }
 
 fn rms(room: &Room, expected: f64, seeds: u64, method: FormFactorMethod) -> f64 {
-    let squares = (0..seeds).map(|seed| (room.from_first(method, seed) / expected - 1.0).powi(2));
+    let squares =
+        (0..seeds).map(|seed| (room.first_to_others(method, seed) / expected - 1.0).powi(2));
     (squares.sum::<f64>() / seeds as f64).sqrt()
 }
 
@@ -84,7 +85,7 @@ fn monte_carlo_beats_independent_samples() {
     });
     assert!(by_directions < -0.6, "{by_directions}");
     let room = screened();
-    let expected = room.from_first(MonteCarlo { samples: 1 << 19 }, 99);
+    let expected = room.first_to_others(MonteCarlo { samples: 1 << 19 }, 99);
     let hidden = slope("hidden", &counts, |samples| {
         rms(&room, expected, 24, MonteCarlo { samples })
     });
@@ -99,7 +100,7 @@ fn analytic_converges_geometrically_and_like_rays_behind_screens() {
     // Each further point in a row gains more than (2.27)²: between 1 and 16 points, more than 100.
     assert!(free < -2.0, "{free}");
     let room = screened();
-    let expected = room.from_first(MonteCarlo { samples: 1 << 19 }, 98);
+    let expected = room.first_to_others(MonteCarlo { samples: 1 << 19 }, 98);
     let error = |samples| rms(&room, expected, 24, Analytic { samples });
     let hidden = slope("analytic, hidden", &[16, 64, 256, 1024], error);
     assert!(hidden < -0.55, "{hidden}");

@@ -97,7 +97,7 @@ impl Room {
     }
 
     /// The form factor from all patches of the first shape to all others.
-    pub fn from_first(&self, method: FormFactorMethod, seed: u64) -> f64 {
+    pub fn first_to_others(&self, method: FormFactorMethod, seed: u64) -> f64 {
         let factors = FormFactors::new(&self.scene, &self.mesh, method, seed);
         let facets = self.mesh.surfaces.facets();
         let mut row = vec![0.0; self.mesh.len()];

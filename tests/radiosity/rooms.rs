@@ -84,6 +84,14 @@ pub fn room_of_blocks(scale: f64, lamp: f64) -> String {
     body + &shape("rectangle", &place, &(diffuse(0.0) + &shining(power)))
 }
 
+/// The same with form factors that are as exact as they get.
+pub fn exact(solver: Solver, patch_size: f64, residual: f64) -> SolveSpec {
+    SolveSpec {
+        form_factors: FormFactorMethod::Analytic { samples: 144 },
+        ..spec(solver, patch_size, residual)
+    }
+}
+
 /// Patches of about this size, solved to this residual, with few rays.
 pub fn spec(solver: Solver, patch_size: f64, residual: f64) -> SolveSpec {
     SolveSpec {
@@ -126,6 +134,18 @@ fn assert_sound(solution: &Solution) {
     let (given, taken) = (r.emitted + r.external, r.absorbed + r.escaped);
     let off = (given - taken).abs().element_sum() / given.element_sum().max(f64::MIN_POSITIVE);
     assert!(off <= r.residual + 1e-9, "{given} {taken}: {off} {r:?}");
+}
+
+/// Mean difference of two solutions on a mesh, relative to the mean radiosity.
+pub fn mean_difference(a: &Solution, b: &Solution) -> f64 {
+    assert_eq!(a.mesh.len(), b.mesh.len());
+    let (mut off, mut all) = (0.0, 0.0);
+    for (i, patch) in a.mesh.patches.iter().enumerate() {
+        let difference = a.radiosity[i] - b.radiosity[i];
+        off += patch.area * difference.abs().element_sum();
+        all += patch.area * a.radiosity[i].element_sum();
+    }
+    off / all
 }
 
 /// Largest difference of two solutions on a mesh, relative to the radiosity of the first.

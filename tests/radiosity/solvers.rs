@@ -9,13 +9,13 @@ fn a_furnace_is_as_bright_as_its_walls_allow() {
     for albedo in [0.5, 0.9, 0.99, 0.999] {
         let scene = scene(&box_inside(1.0, &(diffuse(albedo) + &shining(2.0))));
         for solver in FLAT {
-            let solution = solve(&scene, &spec(solver, 1.0, 1e-9));
+            let solution = solve(&scene, &exact(solver, 1.0, 1e-9));
             // The scene is held in f32.
             let (rho, e) = (f64::from(albedo as f32), 2.0);
             let expected = e / (1.0 - rho);
             for b in &solution.radiosity {
                 let off = (*b / expected - 1.0).abs().max_element();
-                assert!(off < 1e-4, "{solver:?} {albedo}: {b}, not {expected}");
+                assert!(off < 1e-3, "{solver:?} {albedo}: {b}, not {expected}");
             }
             assert!(solution.report.converged && solution.report.warnings.is_empty());
         }
@@ -36,9 +36,10 @@ fn all_solvers_agree() {
         let pairs = first.direct.iter().zip(&other.direct);
         let off = pairs.map(|(a, b)| (*a - *b).abs().max_element() / a.max_element());
         assert!(off.fold(0.0, f64::max) < 1e-4, "{solver:?}");
-        // The walls take in all; some per mille is the error of the form factors.
+        // The walls take in all: some per cent is the error of form factors from four rays each.
         let r = &other.report;
-        assert!(r.escaped.abs().element_sum() < 0.01 * r.emitted.element_sum());
+        let escaped = r.escaped.abs().element_sum() / r.emitted.element_sum();
+        assert!(escaped < 0.05, "{escaped}");
     }
 }
 
@@ -88,7 +89,7 @@ fn two_squares_have_their_closed_form() {
             + &square("<rotate x='1' angle='180'/>", 1.0, &diffuse(b))),
     );
     for solver in FLAT {
-        let solution = solve(&scene, &spec(solver, 1.0, 1e-12));
+        let solution = solve(&scene, &exact(solver, 1.0, 1e-12));
         let lower = e / (1.0 - a * b * f * f);
         for (found, expected) in solution.radiosity.iter().zip([lower, b * f * lower]) {
             assert!(
@@ -212,4 +213,33 @@ fn threads_change_nothing() {
         assert_eq!(one.report.residual, four.report.residual, "{solver:?}");
         assert_eq!(one.report.escaped, four.report.escaped, "{solver:?}");
     }
+}
+
+/// Where form factors decide how bright all is, a bad one is doubted.
+#[test]
+fn form_factors_that_decide_the_brightness_are_doubted() {
+    let scene = scene(&box_inside(1.0, &(diffuse(0.999) + &shining(2.0))));
+    let warnings = |spec| solve(&scene, &spec).report.warnings;
+    let crude = warnings(spec(Solver::GaussSeidel, 1.0, 1e-6));
+    assert_eq!(crude.len(), 1, "{crude:?}");
+    assert!(
+        crude[0].contains("gets out at each reflection"),
+        "{crude:?}"
+    );
+    assert_eq!(warnings(exact(Solver::GaussSeidel, 1.0, 1e-6)).len(), 0);
+}
+
+/// Patches that follow the edges of shadows are solved for like others.
+#[test]
+fn meshes_with_edges_of_shadows_have_about_the_same_light() {
+    let scene = scene(&room_of_blocks(1.0, 0.3));
+    let plain = spec(Solver::GaussSeidel, 0.4, 1e-6);
+    let cut = SolveSpec {
+        discontinuities: true,
+        ..plain.clone()
+    };
+    let (plain, cut) = (solve(&scene, &plain), solve(&scene, &cut));
+    assert!(cut.mesh.len() > plain.mesh.len());
+    let ratio = cut.report.absorbed / plain.report.absorbed;
+    assert!((ratio - 1.0).abs().max_element() < 0.05, "{ratio}");
 }

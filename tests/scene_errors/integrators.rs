@@ -120,12 +120,14 @@ command line:1:14: the integrator "ptracer" cannot connect light to the sensor "
 #[test]
 fn radiosity_without_use_or_effect() {
     says(
-        of("<integrator type='path'><string name='indirect' value='guide'/></integrator>"),
+        of(
+            "<integrator type='path'><string name='indirect' value='guide'/>\n<string name='solver' value='gauss'/></integrator>",
+        ),
         r#"
-a.xml:3:57: walks that radiosity guides are not supported
-  <integrator type='path'><string name='indirect' value='guide'/></integrator>
-                                                         ^
-  help: use "gather", which reads radiosity, or "none""#,
+a.xml:4:31: the solver "gauss" makes no links that walks could be guided by
+  <string name='solver' value='gauss'/></integrator>
+                              ^
+  help: use the solver "hierarchical""#,
     );
     says(
         of("<integrator type='path'><string name='solver' value='gauss'/></integrator>"),
@@ -133,7 +135,7 @@ a.xml:3:57: walks that radiosity guides are not supported
 a.xml:3:55: "solver" has no effect without radiosity
   <integrator type='path'><string name='solver' value='gauss'/></integrator>
                                                        ^
-  help: leave it out, or set "indirect" to "gather""#,
+  help: leave it out, or set "indirect" to "gather" or "guide""#,
     );
     says(
         of(

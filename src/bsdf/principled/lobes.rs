@@ -100,6 +100,15 @@ impl Base {
         self.color * (shape * FRAC_1_PI)
     }
 
+    /// Share of light from everywhere that [`Base::diffuse`] reflects: both of its shapes are polynomials in the
+    /// roughness, whose coefficients were integrated over both hemispheres.
+    pub(super) fn diffuse_albedo(&self) -> Rgb {
+        let r = self.roughness;
+        let burley = 0.952_948 + r * (0.108_702 + r * 0.003_519);
+        let flat = 0.939_110 + r * (0.043_684 + r * 0.002_135);
+        self.color * (burley + (flat - burley) * self.flatness).min(1.0)
+    }
+
     /// Sheen in 1/sr (Burley 2012, section 5.6).
     #[inline]
     pub(super) fn sheen(&self, cos_d: f32) -> Rgb {
@@ -261,4 +270,37 @@ pub(super) fn choose<const N: usize>(probs: [f32; N], u: f32) -> Option<(usize, 
 #[inline]
 pub(super) fn within(part: f32, whole: f32) -> f32 {
     (part / whole).min(1.0 - 0.5 * f32::EPSILON)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The closed form against the mean over pairs of directions by their cosines.
+    #[test]
+    fn diffuse_albedo_is_the_integral_of_the_lobe() {
+        let n = 48;
+        let at = |i: u32| (i as f32 + 0.5) / n as f32;
+        for (roughness, flatness) in [(0.0, 0.0), (0.5, 0.0), (1.0, 0.3), (0.2, 1.0), (1.0, 1.0)] {
+            let base = Base {
+                flatness,
+                ..Base::new(Rgb::WHITE, roughness, 0.0)
+            };
+            let mut sum = 0.0;
+            for (a, b, c) in (0..n * n * n).map(|k| (at(k % n), at(k / n % n), at(k / n / n))) {
+                // Equal steps in the square of the cosine: both are distributed by their cosines.
+                let (cos_o, cos_i) = (a.sqrt(), b.sqrt());
+                let sines = ((1.0 - a) * (1.0 - b)).sqrt();
+                let between = cos_o * cos_i + sines * (c * std::f32::consts::PI).cos();
+                let cos_d = (0.5 * (1.0 + between)).max(0.0).sqrt();
+                sum += f64::from(base.diffuse(cos_o, cos_i, cos_d).r / FRAC_1_PI);
+            }
+            let mean = sum / f64::from(n * n * n);
+            let closed = f64::from(base.diffuse_albedo().r);
+            assert!(
+                (mean / closed - 1.0).abs() < 2e-3,
+                "{mean} {closed} {roughness} {flatness}"
+            );
+        }
+    }
 }

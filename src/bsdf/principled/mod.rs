@@ -95,6 +95,11 @@ impl Principled {
         (1.0 - self.metallic) * (1.0 - self.spec_trans)
     }
 
+    /// Reflectance of the diffuse base alone, without sheen.
+    pub(super) fn diffuse_albedo(&self) -> Rgb {
+        self.base.diffuse_albedo() * self.opaque()
+    }
+
     /// Index beyond the surface over that on the side of `wo`.
     #[inline]
     fn eta_from(&self, outside: bool) -> f32 {

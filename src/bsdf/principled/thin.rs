@@ -55,6 +55,12 @@ impl PrincipledThin {
         [opaque * (1.0 - through), opaque * through]
     }
 
+    /// Reflectance of the diffuse lobe on the side that light comes from, without sheen.
+    pub(in crate::bsdf) fn diffuse_albedo(&self) -> Rgb {
+        let [reflected, _] = self.diffuse_weights();
+        self.base.diffuse_albedo() * reflected
+    }
+
     #[inline]
     fn probs(&self, cos: f32) -> [f32; 4] {
         let [reflected, through] = self.diffuse_weights();

@@ -85,7 +85,7 @@ const INDIRECT: Param = Param::choice(
     "indirect",
     &["none", "gather", "guide"],
     "none",
-    "Light between diffuse surfaces: none, walks find it; gather, read from radiosity where a walk meets a second diffuse surface (biased); luxel only.",
+    "Light between diffuse surfaces: none, walks find it; gather, read from radiosity where a walk meets a second diffuse surface (biased); guide, radiosity sends walks where it comes from (unbiased); luxel only.",
 );
 const SOLVER: Param = Param::choice(
     "solver",
@@ -127,11 +127,10 @@ const MIN_SIZE: Param = Param::optional(
     Kind::Float(Range::Positive),
     "Shortest edge that the solver hierarchical makes, in scene units; without it, a part of the scene.",
 );
-const ERROR: Param = Param::float(
+const ERROR: Param = Param::optional(
     "error",
-    Range::Positive,
-    1e-5,
-    "Greatest error of a link of the solver hierarchical, as a share of the power that the scene emits.",
+    Kind::Float(Range::Positive),
+    "Greatest error of a link of the solver hierarchical, as a share of the power that the scene emits; without it, 1e-5, or 1e-3 behind indirect=gather.",
 );
 const RESIDUAL: Param = Param::float(
     "residual",

@@ -93,10 +93,9 @@ impl Plane {
 
     /// Moves what is nearer to a side than `near` onto it.
     fn to_outline(self, mut st: DVec2, near: f64) -> DVec2 {
-        let heights = self.heights();
-        for side in 0..4 {
+        for (side, height) in self.heights().into_iter().enumerate() {
             let depth = clip::depths(self.outline, st)[side];
-            if depth.abs() * heights[side] > near {
+            if depth.abs() * height > near {
                 continue;
             }
             match (side, self.outline) {

@@ -53,6 +53,20 @@ pub struct Limits {
     pub contacts: usize,
 }
 
+impl Limits {
+    /// No lines are looked for.
+    pub const NONE: Limits = Limits {
+        lamps: 0,
+        corners: 0,
+        edges: 0,
+        shortest: 0.0,
+        facets: 0,
+        smallest: 0.0,
+        lines: 0,
+        contacts: 0,
+    };
+}
+
 impl Default for Limits {
     fn default() -> Limits {
         Limits {
@@ -110,19 +124,43 @@ pub fn mesh(
     size: f64,
     limits: &Limits,
 ) -> (PatchMesh, Found) {
-    let (lines, mut found) = lines(scene, &surfaces, size, limits);
+    let cut = divisions(scene, &surfaces, [size, size], limits);
+    let mesh = PatchMesh {
+        patches: mesh::patches(scene, &surfaces, &cut.pieces),
+        divisions: cut.divisions,
+        cells: (0..cut.pieces.len() as u32)
+            .map(mesh::Cell::Patch)
+            .collect(),
+        surfaces,
+    };
+    (mesh, cut.found)
+}
+
+/// How all facets are divided.
+pub struct Divisions {
+    /// By facet.
+    pub divisions: Vec<Division>,
+    /// By cell: its facet, and what it covers.
+    pub pieces: Vec<(u32, Piece)>,
+    pub found: Found,
+}
+
+/// Divides facets that lines cross into triangles of about `size`, and others into cells of at most `whole`; both in
+/// scene units.
+pub fn divisions(
+    scene: &Scene,
+    surfaces: &Surfaces,
+    [whole, size]: [f64; 2],
+    limits: &Limits,
+) -> Divisions {
+    let (lines, mut found) = lines(scene, surfaces, size, limits);
     let facets = surfaces.facets();
     let cut: Vec<Option<Triangulation>> = facets
         .par_iter()
         .zip(&lines)
-        .map(|(facet, lines)| insert::triangulate(&facet.piece, size, lines))
+        .map(|(facet, lines)| triangulate(&facet.piece, size, lines))
         .collect();
-    let mut mesh = PatchMesh {
-        patches: Vec::new(),
-        divisions: Vec::new(),
-        cells: Vec::new(),
-        surfaces: surfaces.clone(),
-    };
+    let mut divisions = Vec::new();
     let mut pieces = Vec::new();
     for (i, (facet, cut)) in facets.iter().zip(cut).enumerate() {
         let first = pieces.len() as u32;
@@ -141,21 +179,20 @@ pub fn mesh(
                 if !lines[i].is_empty() {
                     found.left_out.untriangulated += 1;
                 }
-                let grid = Grid {
-                    n: cells_for(&facet.piece, size),
-                    first: mesh.cells.len() as u32,
-                };
-                for index in 0..grid.count(facet.piece.outline) {
-                    mesh.cells.push(mesh::Cell::Patch(pieces.len() as u32));
-                    pieces.push((i as u32, grid.piece(&facet.piece, index)));
-                }
+                let n = cells_for(&facet.piece, whole);
+                let grid = Grid { n, first };
+                let all = 0..grid.count(facet.piece.outline);
+                pieces.extend(all.map(|index| (i as u32, grid.piece(&facet.piece, index))));
                 Division::Grid(grid)
             }
         };
-        mesh.divisions.push(division);
+        divisions.push(division);
     }
-    mesh.patches = mesh::patches(scene, &surfaces, &pieces);
-    (mesh, found)
+    Divisions {
+        divisions,
+        pieces,
+        found,
+    }
 }
 
 /// The lines on each facet that patches of about `size` scene units should follow, strongest first, contacts before
@@ -166,8 +203,11 @@ pub fn lines(
     size: f64,
     limits: &Limits,
 ) -> (Vec<Vec<Line>>, Found) {
-    let shell = Shell::new(scene, surfaces);
     let mut found = Found::default();
+    if *limits == Limits::NONE {
+        return (vec![Vec::new(); surfaces.facets().len()], found);
+    }
+    let shell = Shell::new(scene, surfaces);
     let (sources, lamps) = source::sources(scene, surfaces, &shell, limits);
     found.left_out.lamps = lamps;
     found.left_out.curved = sources.iter().filter(|s| s.smooth).count();

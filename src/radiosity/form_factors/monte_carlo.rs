@@ -10,7 +10,6 @@
 use super::analytic::kernel;
 use super::sight::{Role, Sight};
 use super::{Face, FormFactors};
-use crate::geom::Endpoint;
 use crate::math::{DVec2, DVec3};
 use std::cell::OnceCell;
 use std::f64::consts::TAU;
@@ -93,7 +92,7 @@ impl FormFactors<'_> {
             }
             let st = piece.locate(launch.x + launch.d * (height / fall));
             if piece.outline.contains(st) {
-                let x: Endpoint = sight.at(i, launch.st);
+                let x = sight.at(i, launch.st);
                 sum += sight.between(&x, &sight.at(j, st));
             }
         }

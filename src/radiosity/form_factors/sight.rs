@@ -2,7 +2,7 @@
 
 use super::super::PatchMesh;
 use crate::geom::Endpoint;
-use crate::math::{DVec2, DVec3};
+use crate::math::{DVec2, DVec3, fp};
 use crate::sampler::mix;
 use crate::scene::Scene;
 use rayon::prelude::*;
@@ -10,7 +10,7 @@ use rayon::prelude::*;
 /// Masks that one connection passes at most; what stands behind more of them is not seen.
 const PASSES: u32 = 64;
 
-/// Most points that are kept; beyond, they are found anew for each ray. 36 bytes each.
+/// Most points that are kept; beyond, they are found anew for each ray. 40 bytes each.
 const KEPT: usize = 1 << 22;
 
 /// 1/φ, 1/φ², ... for the real root of φ⁵ = φ + 1: multiples of these, without their integer parts, fill the
@@ -20,6 +20,31 @@ const STEPS: [DVec2; 2] = [
     DVec2::new(0.856_674_883_854_502_9, 0.733_891_856_627_126),
     DVec2::new(0.628_706_721_037_808_6, 0.538_597_257_223_61),
 ];
+
+/// A point on a patch, and how much further the test of rays against its triangles may err there than it says.
+#[derive(Clone, Copy, Debug)]
+pub struct Point {
+    end: Endpoint,
+    slack: f32,
+}
+
+/// By how much of the height of one point over the other's plane the ends of a ray are moved at most.
+const CLEARANCE: f32 = 0.01;
+
+impl Point {
+    /// The end of a ray to or from `other`. The error that a hit carries allows for that of the triangle test
+    /// along an axis. For rays that are oblique to all axes the test's shear makes larger numbers of the corners:
+    /// of rays from a wall to a floor a hundred times as wide as they are long, 1.7e-4 met the floor before its
+    /// point. Three times the allowance is as much as the shear can add.
+    #[inline]
+    fn towards(&self, other: &Point) -> Endpoint {
+        let height = (other.end.p - self.end.p).dot(self.end.ng).abs();
+        Endpoint {
+            p_err: self.end.p_err + self.slack.min(CLEARANCE * height),
+            ..self.end
+        }
+    }
+}
 
 /// Which two of the four dimensions of a pair of points a patch has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,7 +63,7 @@ pub struct Sight<'a> {
     seed: u64,
     pub samples: u32,
     /// By patch, role and number; empty when these would be too many.
-    kept: Vec<Endpoint>,
+    kept: Vec<Point>,
 }
 
 impl<'a> Sight<'a> {
@@ -86,16 +111,22 @@ impl<'a> Sight<'a> {
 
     /// The surface at a place of a patch.
     #[inline]
-    pub fn at(&self, patch: u32, st: DVec2) -> Endpoint {
-        Endpoint::from(&self.mesh.hit(self.scene, patch, st))
+    pub fn at(&self, patch: u32, st: DVec2) -> Point {
+        let facet = self.mesh.patches[patch as usize].facet;
+        let piece = &self.mesh.surfaces.facets()[facet as usize].piece;
+        let across = (piece.e1.length() + piece.e2.length()) as f32;
+        Point {
+            end: Endpoint::from(&self.mesh.hit(self.scene, patch, st)),
+            slack: across * fp::PLANE_ERROR,
+        }
     }
 
-    fn make(&self, patch: u32, role: Role, k: u32) -> Endpoint {
+    fn make(&self, patch: u32, role: Role, k: u32) -> Point {
         self.at(patch, self.place(patch, role, k))
     }
 
     #[inline]
-    fn endpoint(&self, patch: u32, role: Role, k: u32) -> Endpoint {
+    fn endpoint(&self, patch: u32, role: Role, k: u32) -> Point {
         let index = (patch as usize * 2 + role as usize) * self.samples as usize + k as usize;
         match self.kept.get(index) {
             Some(point) => *point,
@@ -123,8 +154,8 @@ impl<'a> Sight<'a> {
 
     /// The same between any two points on surfaces. 1 for points so near that nothing fits between.
     #[inline]
-    pub fn between(&self, x: &Endpoint, y: &Endpoint) -> f64 {
-        let ray = x.segment_to(y, 0.0);
+    pub fn between(&self, x: &Point, y: &Point) -> f64 {
+        let ray = x.towards(y).segment_to(&y.towards(x), 0.0);
         // Also false for the NaN of two points at the same place.
         if !(ray.t_max > 0.0 && ray.d.is_finite()) {
             return 1.0;

@@ -114,7 +114,7 @@ pub fn solve(
     }
     report.links = tree.links();
     let _ = stopped;
-    let solution = output::solution(&tree, &field, report);
+    let solution = output::solution(scene, &tree, &field, report);
     if solution.mesh.is_empty() {
         return Err(SolveError::NoPatches);
     }

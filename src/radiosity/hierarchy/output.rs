@@ -3,8 +3,10 @@
 use super::gather::Field;
 use super::tree::{Kind, NONE, Tree};
 use super::{Hierarchy, Link, Node};
-use crate::radiosity::mesh::{Cell, Division, Patch};
+use crate::radiosity::mesh::{Cell, Patch};
+use crate::radiosity::report::{self, Balance};
 use crate::radiosity::{PatchMesh, Report, Rgb64, Solution};
+use crate::scene::Scene;
 
 /// Numbers of the patches below each node, as nodes are met depth first.
 pub struct Numbers {
@@ -72,7 +74,7 @@ pub fn mesh(tree: &Tree) -> (PatchMesh, Numbers) {
     let mesh = PatchMesh {
         surfaces: tree.surfaces.clone(),
         patches: numbers.leaf.iter().map(patch).collect(),
-        divisions: tree.grids.iter().map(|g| Division::Grid(*g)).collect(),
+        divisions: tree.divisions.clone(),
         cells,
     };
     (mesh, numbers)
@@ -84,7 +86,7 @@ pub fn by_patch(_tree: &Tree, numbers: &Numbers, values: &[Rgb64]) -> Vec<Rgb64>
 }
 
 /// What was found, with its energy balance.
-pub fn solution(tree: &Tree, field: &Field, mut report: Report) -> Solution {
+pub fn solution(scene: &Scene, tree: &Tree, field: &Field, report: Report) -> Solution {
     let (mesh, numbers) = mesh(tree);
     let direct = Field::of_emission(tree).arriving(tree);
     let mut solution = Solution {
@@ -95,19 +97,26 @@ pub fn solution(tree: &Tree, field: &Field, mut report: Report) -> Solution {
         mesh,
         report: Report::default(),
     };
-    let (mut emitted, mut external) = (Rgb64::ZERO, Rgb64::ZERO);
-    let mut absorbed = Rgb64::ZERO;
-    for (i, patch) in solution.mesh.patches.iter().enumerate() {
-        emitted += patch.emission * patch.area;
-        external += tree.nodes[numbers.leaf[i] as usize].external * patch.area;
-        absorbed += (Rgb64::ONE - patch.albedo) * solution.irradiance[i] * patch.area;
-    }
-    report.patches = solution.mesh.len();
-    report.emitted = emitted;
-    report.external = external;
-    report.absorbed = absorbed;
-    report.escaped = emitted + external - absorbed;
-    solution.report = report;
+    let external = |&node: &u32| tree.nodes[node as usize].external;
+    let external: Vec<Rgb64> = numbers.leaf.iter().map(external).collect();
+    let balance = Balance {
+        mesh: &solution.mesh,
+        external: &external,
+        irradiance: &solution.irradiance,
+        escaped: Rgb64::ZERO,
+    };
+    let found = report::of(scene, &balance);
+    solution.report = Report {
+        patches: solution.mesh.len(),
+        // Links do not know what they miss: the rest of the light.
+        escaped: found.emitted + found.external - found.absorbed,
+        emitted: found.emitted,
+        external: found.external,
+        absorbed: found.absorbed,
+        other: found.other,
+        warnings: [found.warnings, tree.left_out.clone()].concat(),
+        ..report
+    };
     solution
 }
 

@@ -2,7 +2,8 @@
 
 use super::cluster;
 use crate::math::DVec3;
-use crate::radiosity::mesh::{Grid, cells_for, of_piece};
+use crate::radiosity::discontinuity::{self, Divisions, Limits};
+use crate::radiosity::mesh::{self, Division, of_piece};
 use crate::radiosity::{Piece, Rgb64, SolveError, SolveSpec, Surfaces};
 use crate::scene::Scene;
 use std::sync::Arc;
@@ -54,7 +55,9 @@ pub struct TreeLink {
 pub struct Tree {
     pub surfaces: Arc<Surfaces>,
     /// By facet: its cells, which are surface nodes without a surface as their parent, in a row.
-    pub grids: Vec<Grid>,
+    pub divisions: Vec<Division>,
+    /// What was left out of these: sentences for the user.
+    pub left_out: Vec<String>,
     /// By number of cell: its node.
     pub cells: Vec<u32>,
     /// Clusters come before what they contain; quarters after all that was there when they were made.
@@ -67,36 +70,43 @@ pub struct Tree {
     pub max_patches: u64,
 }
 
+/// Patches to begin with that lines are cut for where no size is given.
+const PATCHES_ALONG_LINES: u64 = 2_000;
+
+/// The cells of all facets.
+fn divided(scene: &Scene, surfaces: &Surfaces, spec: &SolveSpec) -> Result<Divisions, SolveError> {
+    let size = spec.patch_size.unwrap_or(f64::INFINITY);
+    let check = |patches: u64| match patches > spec.max_patches {
+        true => Err(SolveError::TooManyPatches {
+            patches,
+            limit: spec.max_patches,
+        }),
+        false => Ok(()),
+    };
+    check(mesh::count(surfaces, size))?;
+    let (along, limits) = match spec.discontinuities {
+        true => {
+            let fine = || mesh::size_for(surfaces, PATCHES_ALONG_LINES);
+            (spec.patch_size.unwrap_or_else(fine), Limits::default())
+        }
+        false => (size, Limits::NONE),
+    };
+    let divisions = discontinuity::divisions(scene, surfaces, [size, along], &limits);
+    check(divisions.pieces.len() as u64)?;
+    Ok(divisions)
+}
+
 impl Tree {
     pub fn new(
         scene: &Scene,
         surfaces: Arc<Surfaces>,
         spec: &SolveSpec,
     ) -> Result<Tree, SolveError> {
-        let size = spec.patch_size.unwrap_or(f64::INFINITY);
-        let mut grids = Vec::new();
-        let mut pieces = Vec::new();
-        let mut count = 0;
-        for facet in surfaces.facets() {
-            let grid = Grid {
-                n: cells_for(&facet.piece, size),
-                first: count,
-            };
-            let cells = grid.count(facet.piece.outline);
-            if u64::from(count) + u64::from(cells) > spec.max_patches {
-                return Err(SolveError::TooManyPatches {
-                    patches: u64::from(count) + u64::from(cells),
-                    limit: spec.max_patches,
-                });
-            }
-            count += cells;
-            grids.push(grid);
-        }
-        for (i, (facet, grid)) in surfaces.facets().iter().zip(&grids).enumerate() {
-            for cell in 0..grid.count(facet.piece.outline) {
-                pieces.push((i as u32, grid.piece(&facet.piece, cell)));
-            }
-        }
+        let Divisions {
+            divisions,
+            pieces,
+            found,
+        } = divided(scene, &surfaces, spec)?;
         use rayon::prelude::*;
         let make = |&(facet, piece): &(u32, Piece)| {
             let optics = of_piece(scene, &surfaces, facet, &piece);
@@ -115,10 +125,11 @@ impl Tree {
             clusters,
             by_cluster,
             surfaces,
-            grids,
+            divisions,
+            left_out: found.warnings(),
             cells,
             nodes,
-            patches: u64::from(count),
+            patches: pieces.len() as u64,
             max_patches: spec.max_patches,
         })
     }

@@ -5,6 +5,7 @@
 //! of those that get from i. Rows are taken as they are: those that sum to more than 1 are not scaled down in
 //! silence; where light would grow for that reason, it is an error that says so.
 
+mod closure;
 mod direct;
 mod gathering;
 mod memory;
@@ -14,6 +15,7 @@ mod watch;
 #[cfg(test)]
 mod tests;
 
+use super::discontinuity::{self, Limits};
 use super::form_factors::{FormFactors, Matrix};
 use super::report::{self, Balance};
 use super::{
@@ -139,10 +141,11 @@ pub(super) fn solve(
     observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Solution, SolveError> {
     let start = Instant::now();
-    let mesh = divided(scene, surfaces, spec)?;
+    let (mesh, said) = divided(scene, surfaces, spec)?;
     let mesh_seconds = start.elapsed().as_secs_f64();
     let start = Instant::now();
     let system = System::new(&mesh, lights::external(scene, &mesh, spec.seed));
+    closure::check(scene, &system, spec.seed)?;
     let run = Run {
         // Not a number asks for as little as there can be.
         residual: spec.residual.max(0.0),
@@ -151,10 +154,9 @@ pub(super) fn solve(
     };
     let solved = by_spec(scene, &system, spec, run)?;
     let seconds = start.elapsed().as_secs_f64() - solved.form_factor_seconds;
-    let System { external, .. } = system;
     let balance = Balance {
         mesh: &mesh,
-        external: &external,
+        external: &system.external,
         irradiance: &solved.irradiance,
         escaped: solved.escaped,
     };
@@ -169,8 +171,14 @@ pub(super) fn solve(
         solve_seconds: seconds,
         ..report::of(scene, &balance)
     };
+    report.warnings.extend(said);
     let doubts = doubts(&report, solved.row_sum);
     report.warnings.extend(doubts);
+    if report.converged {
+        let ways = [report.absorbed, report.escaped].map(Rgb64::element_sum);
+        let doubt = closure::doubt(scene, &system, &solved.radiosity, ways, spec.seed);
+        report.warnings.extend(doubt);
+    }
     Ok(Solution {
         radiosity: solved.radiosity,
         irradiance: solved.irradiance,
@@ -181,12 +189,12 @@ pub(super) fn solve(
     })
 }
 
-/// The mesh that `spec` asks for, refused before it is made where it has too many patches.
+/// The mesh that `spec` asks for, refused before it is made where it has too many patches; and what to say of it.
 fn divided(
     scene: &Scene,
     surfaces: Arc<Surfaces>,
     spec: &SolveSpec,
-) -> Result<PatchMesh, SolveError> {
+) -> Result<(PatchMesh, Vec<String>), SolveError> {
     let wanted = match spec.solver {
         Solver::Shooting => PATCHES_OF_SHOOTING,
         _ => PATCHES_OF_MATRIX,
@@ -194,13 +202,22 @@ fn divided(
     let size = spec
         .patch_size
         .unwrap_or_else(|| mesh::size_for(&surfaces, wanted));
-    let patches = mesh::count(&surfaces, size);
-    let limit = spec.max_patches.min(mesh::MOST_PATCHES);
-    if patches > limit {
-        return Err(SolveError::TooManyPatches { patches, limit });
+    admit(spec, mesh::count(&surfaces, size))?;
+    if !spec.discontinuities {
+        return Ok((PatchMesh::uniform(scene, surfaces, size), Vec::new()));
     }
-    memory::check(spec.solver, patches)?;
-    Ok(PatchMesh::uniform(scene, surfaces, size))
+    let (mesh, found) = discontinuity::mesh(scene, surfaces, size, &Limits::default());
+    admit(spec, mesh.len() as u64)?;
+    Ok((mesh, found.warnings()))
+}
+
+/// Refuses more patches than there may be, or than the solver has memory for.
+fn admit(spec: &SolveSpec, patches: u64) -> Result<(), SolveError> {
+    let limit = spec.max_patches.min(mesh::MOST_PATCHES);
+    match patches > limit {
+        true => Err(SolveError::TooManyPatches { patches, limit }),
+        false => memory::check(spec.solver, patches),
+    }
 }
 
 fn by_spec(

@@ -1,7 +1,7 @@
 //! Progressive refinement: the patch with most light to give sends it to all others (Cohen, Chen, Wallace &
 //! Greenberg 1988, "A Progressive Refinement Approach to Fast Radiosity Image Generation").
 
-use super::watch::Watch;
+use super::watch::{Watch, grows};
 use super::{Exchange, Run, Solved, System};
 use crate::radiosity::{Progress, Rgb64, SolveError, Solver};
 use rayon::prelude::*;
@@ -59,7 +59,8 @@ pub(super) fn shoot(
         if stop {
             break;
         }
-        if steps.is_multiple_of(patches.len() as u64) && watch.is_stuck(residual) {
+        let round = steps.is_multiple_of(patches.len() as u64);
+        if grows(residual) || (round && watch.is_stuck(residual)) {
             return Err(system.growth(Solver::Shooting, state.row_sum));
         }
     }

@@ -14,6 +14,14 @@ const WINDOW: u32 = 100;
 /// is not told from the error of form factors (see `direct::MOST_GAIN`).
 const LEAST: f64 = 1e-4;
 
+/// A residual that no iteration reaches which will converge: it begins with what was emitted, as 1.
+const GROWN: f64 = 1e3;
+
+/// Whether light grows.
+pub(super) fn grows(residual: f64) -> bool {
+    !residual.is_finite() || residual > GROWN
+}
+
 impl Watch {
     pub fn new() -> Watch {
         Watch {
@@ -24,7 +32,7 @@ impl Watch {
 
     /// Whether the iteration has stopped to come nearer, with `residual` after one more round.
     pub fn is_stuck(&mut self, residual: f64) -> bool {
-        if !residual.is_finite() {
+        if grows(residual) {
             return true;
         }
         self.rounds += 1;

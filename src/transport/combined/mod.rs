@@ -25,8 +25,8 @@ use super::light_walk::LightWalk;
 use super::mis::Techniques;
 use super::path::{Start, UNBOUNDED};
 use super::photons::{self, Kernel, KernelShape, PhotonMap, Shoot};
-use super::radiosity::{Cache, Reader, Reads, Solving};
-use super::{CacheSpec, Indirect, Iteration, Ledger, Li, PathSpec, PhotonSpec, Setting, Technique};
+use super::radiosity::{Cache, Guiding, Reader, Reads, Solving};
+use super::{CacheSpec, Iteration, Ledger, Li, PathSpec, PhotonSpec, Setting, Technique};
 use crate::geom::Ray;
 use crate::light::Aim;
 use crate::sampler::Sampler;
@@ -126,14 +126,11 @@ impl<'a> Combined<'a> {
             None => RADIUS_IN_PIXELS * photons::footprint(&setting),
         };
         let cache = &spec.cache;
-        let used = spec.show == Show::All
-            && cache.indirect == Indirect::Gather
-            && cache.is_used(setting.scene, &spec.path).is_ok();
+        let used = spec.show == Show::All && cache.is_used(setting.scene, &spec.path).is_ok();
         Combined {
             spec,
             setting,
-            solving: used
-                .then(|| Solving::new(setting.scene, &cache.solve, cache.given.as_ref(), true)),
+            solving: used.then(|| Solving::of(setting.scene, cache)),
             aim: setting.scene.aim_at_caustics(),
             count: spec.photons.count.unwrap_or(pixels),
             radius,
@@ -228,6 +225,21 @@ impl<'a> Combined<'a> {
         ledger: &mut Ledger,
     ) -> Li {
         let (scene, path) = (self.setting.scene, &self.spec.path);
+        if let Some(guide) = &cache.guide {
+            let gathering = Gathering {
+                caustics: iteration.caustics.as_ref(),
+                max_depth: path.max_depth.unwrap_or(UNBOUNDED),
+                alone: false,
+                found: Default::default(),
+            };
+            let mut guiding = Guiding::new(scene, guide, gathering);
+            let start = Start::at_camera(ray);
+            let li = path.walk(scene, start, sampler, &mut ledger.rays, &mut guiding);
+            let found = guiding.gather.found;
+            ledger.record(Technique::Merging, found);
+            ledger.record(Technique::Path, li.radiance - found);
+            return li;
+        }
         let mut reader = Reader::<true>::new(scene, path, Some(cache), Reads::ReflectedBehind);
         reader.caustics = iteration.caustics.as_ref();
         let start = Start::at_camera(ray);

@@ -21,7 +21,7 @@
 use std::ops::AddAssign;
 
 use super::solved::Cache;
-use super::{CacheSpec, Solving};
+use super::{CacheSpec, Guiding, Solving};
 use crate::bsdf::{Density, Mode};
 use crate::geom::Ray;
 use crate::math::{PI, Rgb, Vec2, Vec3};
@@ -261,7 +261,7 @@ impl<'a> CachedPath<'a> {
         CachedPath {
             path,
             setting,
-            solving: Solving::new(setting.scene, &cache.solve, cache.given.as_ref(), true),
+            solving: Solving::of(setting.scene, cache),
         }
     }
 
@@ -269,6 +269,11 @@ impl<'a> CachedPath<'a> {
     #[inline]
     pub fn sample(&self, ray: Ray, sampler: &Sampler, ledger: &mut Ledger) -> Li {
         let (scene, cache) = (self.setting.scene, self.solving.get());
+        if let Some(guide) = cache.and_then(|cache| cache.guide.as_ref()) {
+            let mut guiding = Guiding::new(scene, guide, WalkOnly);
+            let start = Start::at_camera(ray);
+            return (self.path).walk(scene, start, sampler, &mut ledger.rays, &mut guiding);
+        }
         let mut reader = Reader::<false>::new(scene, self.path, cache, Reads::ReflectedBehind);
         let start = Start::at_camera(ray);
         let li = (self.path).walk(scene, start, sampler, &mut ledger.rays, &mut reader);

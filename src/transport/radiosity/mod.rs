@@ -11,13 +11,15 @@
 //! is right at all times, and so is all that is seen in mirrors and through glass.
 
 mod gather;
+mod guide;
 mod solved;
 mod view;
 
 pub use gather::Bias;
 pub(super) use gather::{CachedPath, Reader, Reads};
+pub(super) use guide::Guiding;
 pub use solved::Solved;
-pub(super) use solved::{Cache, Solving};
+pub(super) use solved::{Cache, Solving, Use};
 pub(super) use view::View;
 
 use super::PathSpec;
@@ -50,13 +52,35 @@ impl Indirect {
 }
 
 /// The use that a path tracer makes of radiosity.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct CacheSpec {
     pub indirect: Indirect,
     pub solve: SolveSpec,
     /// What is read, if it is known already.
     pub given: Option<Solved>,
 }
+
+impl Default for CacheSpec {
+    fn default() -> CacheSpec {
+        CacheSpec {
+            indirect: Indirect::None,
+            solve: SolveSpec {
+                error: GATHER_ERROR,
+                residual: CACHE_RESIDUAL,
+                gloss_as_diffuse: true,
+                ..SolveSpec::default()
+            },
+            given: None,
+        }
+    }
+}
+
+/// Error of a link that is good enough behind a final gather. Measured at 16 samples per pixel: in Mitsuba's Cornell
+/// box the bias of the mean is 0.8 % with 1e-3 and 0.6 % with 1e-4 or 1e-5, which take 4 and 20 times as long; in a
+/// stairwell of 145,000 patches 4.8 %, 4.2 % and 4.1 %, most of it light by gloss and mirrors, at 3 and 8 times.
+const GATHER_ERROR: f64 = 1e-3;
+/// Share of the light that may still be under way in a cache.
+const CACHE_RESIDUAL: f64 = 1e-3;
 
 /// Path tracing with radiosity to help it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -106,7 +130,23 @@ pub struct RadiositySpec {
 /// is read, the one where it is read, the one that is seen, the eye.
 const CACHED_EDGES: u32 = 4;
 
+/// Greatest error of a link where radiosity guides walks (see [`SolveSpec::error`]).
+pub const GUIDE_ERROR: f64 = 1e-3;
+
 impl CacheSpec {
+    /// What is made of light between diffuse surfaces, with a solution as good as that needs.
+    pub fn of(indirect: Indirect) -> CacheSpec {
+        let mut solve = CacheSpec::default().solve;
+        if indirect == Indirect::Guide {
+            solve.error = GUIDE_ERROR;
+        }
+        CacheSpec {
+            indirect,
+            solve,
+            given: None,
+        }
+    }
+
     /// Whether there is anything to read in `scene` for walks of `path`; if not, why.
     pub fn is_used(&self, scene: &Scene, path: &PathSpec) -> Result<(), &'static str> {
         if self.indirect == Indirect::None {
@@ -125,8 +165,11 @@ impl CacheSpec {
         }
         Some(entry(self.is_used(scene, path), scene, || {
             let solver = self.solve.solver.name();
-            let read = "read where a walk meets a second diffuse surface";
-            format!("solved once (solver {solver}), {read}")
+            let used = match self.indirect {
+                Indirect::Guide => "sends walks from diffuse surfaces where their light comes from",
+                _ => "read where a walk meets a second diffuse surface",
+            };
+            format!("solved once (solver {solver}), {used}")
         }))
     }
 }

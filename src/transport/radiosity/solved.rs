@@ -4,9 +4,12 @@ use std::ops::ControlFlow;
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
+use super::{CacheSpec, Indirect};
 use crate::geom::Hit;
 use crate::math::Rgb;
-use crate::radiosity::{self, Display, Progress, Report, Rgb64, Solution, SolveError, SolveSpec};
+use crate::radiosity::{
+    self, Display, Guide, Progress, Report, Rgb64, Solution, SolveError, SolveSpec,
+};
 use crate::scene::Scene;
 
 /// A solution that is known already. Two are equal if they are the same one.
@@ -29,6 +32,8 @@ pub struct Cache {
     smooth: Option<Smooth>,
     /// Squared distance from a patch, in scene units, within which its irradiance is too coarse to be seen.
     near2: Vec<f32>,
+    /// Where light comes from, if walks are guided.
+    pub guide: Option<Guide>,
 }
 
 /// Irradiance interpolated between the vertices of patches.
@@ -36,6 +41,17 @@ struct Smooth {
     display: Display,
     total: Vec<Rgb64>,
     reflected: Vec<Rgb64>,
+}
+
+/// What a solution is made ready for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Use {
+    /// Irradiance is read, the same all over a patch.
+    Flat,
+    /// Irradiance is read, interpolated within surfaces.
+    Smooth,
+    /// Walks are guided.
+    Guide,
 }
 
 /// What is read at a hit.
@@ -47,8 +63,7 @@ pub struct Read {
 }
 
 impl Cache {
-    /// `smooth`: interpolated between vertices.
-    pub fn new(solution: Arc<Solution>, scene: &Scene, smooth: bool) -> Cache {
+    pub fn new(solution: Arc<Solution>, scene: &Scene, made_for: Use) -> Cache {
         let diagonal = scene.world().bounds().diagonal().length();
         let most = (NEAR * diagonal).powi(2);
         let patches = 0..solution.mesh.len() as u32;
@@ -62,7 +77,11 @@ impl Cache {
             }
         };
         Cache {
-            smooth: smooth.then(interpolated),
+            smooth: (made_for == Use::Smooth).then(interpolated),
+            guide: match made_for {
+                Use::Guide => Guide::new(scene, Arc::clone(&solution)),
+                _ => None,
+            },
             total: solution.irradiance.iter().map(|e| rgb(*e)).collect(),
             reflected: reflected.iter().map(|e| rgb(*e)).collect(),
             near2: (solution.mesh.patches.iter())
@@ -112,25 +131,33 @@ pub struct Solving<'a> {
     scene: &'a Scene,
     spec: &'a SolveSpec,
     given: Option<&'a Solved>,
-    smooth: bool,
+    made_for: Use,
     made: OnceLock<Result<Option<Cache>, SolveError>>,
 }
 
 impl<'a> Solving<'a> {
-    /// `smooth`: irradiance is to be interpolated within surfaces.
     pub fn new(
         scene: &'a Scene,
         spec: &'a SolveSpec,
         given: Option<&'a Solved>,
-        smooth: bool,
+        made_for: Use,
     ) -> Solving<'a> {
         Solving {
-            smooth,
+            made_for,
             scene,
             spec,
             given,
             made: OnceLock::new(),
         }
+    }
+
+    /// What a path tracer makes of radiosity.
+    pub fn of(scene: &'a Scene, cache: &'a CacheSpec) -> Solving<'a> {
+        let made_for = match cache.indirect {
+            Indirect::Guide => Use::Guide,
+            Indirect::None | Indirect::Gather => Use::Smooth,
+        };
+        Solving::new(scene, &cache.solve, cache.given.as_ref(), made_for)
     }
 
     /// Solves, on all threads of the current pool, unless that is done. `observe` sees every step and may stop the
@@ -159,7 +186,9 @@ impl<'a> Solving<'a> {
                 Err(error) => return Err(error),
             },
         };
-        Ok(Some(Cache::new(solution, self.scene, self.smooth)))
+        let cache = Cache::new(solution, self.scene, self.made_for);
+        // Without links, nothing to be guided by.
+        Ok((self.made_for != Use::Guide || cache.guide.is_some()).then_some(cache))
     }
 
     /// The solution, once [`Solving::prepare`] has made it; `None` where there is nothing to read.

@@ -5,7 +5,7 @@
 //! one or, for a final gather, at the next one that a ray from there meets.
 
 use super::gather::{Reader, Reads};
-use super::{RadiositySpec, Show, Solving};
+use super::{RadiositySpec, Show, Solving, Use};
 use crate::geom::Ray;
 use crate::sampler::Sampler;
 use crate::scene::Scene;
@@ -32,8 +32,11 @@ pub struct View<'a> {
 impl<'a> View<'a> {
     pub fn new(spec: &'a RadiositySpec, setting: Setting<'a>) -> View<'a> {
         let scene = setting.scene;
-        let smooth = spec.show != Show::Flat;
-        let solving = || Solving::new(scene, &spec.solve, spec.given.as_ref(), smooth);
+        let made_for = match spec.show {
+            Show::Flat => Use::Flat,
+            _ => Use::Smooth,
+        };
+        let solving = || Solving::new(scene, &spec.solve, spec.given.as_ref(), made_for);
         View {
             spec,
             setting,

@@ -3,7 +3,7 @@
 use crate::format::compile::{on_command_line, suggest};
 use crate::format::{Overrides, Props, SceneError};
 use crate::radiosity::{FormFactorMethod, SolveSpec, Solver};
-use crate::transport::radiosity::{Indirect, Show};
+use crate::transport::radiosity::{GUIDE_ERROR, Indirect, Show};
 use crate::transport::{CacheSpec, IntegratorSpec, PathSpec, RadiositySpec};
 
 /// Parameters that only a solution needs.
@@ -22,8 +22,8 @@ const SOLVING: [&str; 11] = [
 ];
 
 /// How radiosity is solved for, from the parameters that all integrators with a use of it share.
-pub fn solve(props: &Props) -> Result<SolveSpec, SceneError> {
-    let defaults = SolveSpec::default();
+/// What is not given is as in `defaults`.
+pub fn solve(props: &Props, defaults: SolveSpec) -> Result<SolveSpec, SceneError> {
     let solver = props.string("solver")?;
     let solver = Solver::ALL.into_iter().find(|s| s.name() == solver);
     let solver = solver.unwrap_or(defaults.solver);
@@ -49,7 +49,7 @@ pub fn solve(props: &Props) -> Result<SolveSpec, SceneError> {
         form_factors: form_factors(props)?,
         patch_size: optional("patch_size")?,
         min_size: optional("min_size")?,
-        error: props.float("error")?,
+        error: optional("error")?.unwrap_or(defaults.error),
         residual: props.float("residual")?,
         max_steps,
         curve_error: props.float("curve_error")?,
@@ -94,7 +94,7 @@ pub fn shown(props: &Props, path: PathSpec) -> Result<IntegratorSpec, SceneError
     let show = Show::ALL.into_iter().find(|d| d.name() == show);
     Ok(IntegratorSpec::Radiosity(RadiositySpec {
         path,
-        solve: solve(props)?,
+        solve: solve(props, SolveSpec::default())?,
         show: show.unwrap_or_default(),
         given: None,
     }))
@@ -105,21 +105,29 @@ pub fn cache(props: &Props) -> Result<CacheSpec, SceneError> {
     let name = props.string("indirect")?;
     let indirect = Indirect::ALL.into_iter().find(|i| i.name() == name);
     let indirect = indirect.unwrap_or_default();
-    if indirect == Indirect::Guide {
-        return Err(props.error_at("indirect", NO_GUIDE).with_help(INSTEAD));
-    }
     if indirect == Indirect::None {
         if let Some(name) = SOLVING.into_iter().find(|name| props.is_given(name)) {
             let what = format!("\"{name}\" has no effect without radiosity");
-            let help = "leave it out, or set \"indirect\" to \"gather\"";
+            let help = "leave it out, or set \"indirect\" to \"gather\" or \"guide\"";
             return Err(props.error_at(name, what).with_help(help));
         }
         props.ignore(&SOLVING);
         return Ok(CacheSpec::default());
     }
+    let mut solve = solve(props, CacheSpec::default().solve)?;
+    if indirect == Indirect::Guide {
+        if solve.solver != Solver::Hierarchical {
+            return Err(props
+                .error_at("solver", no_links(solve.solver))
+                .with_help(INSTEAD));
+        }
+        if !props.is_given("error") {
+            solve.error = GUIDE_ERROR;
+        }
+    }
     Ok(CacheSpec {
         indirect,
-        solve: solve(props)?,
+        solve,
         given: None,
     })
 }
@@ -139,10 +147,15 @@ pub fn overridden(
             error(format!("unknown way \"{name}\" to find indirect light")).with_help(help),
         );
     };
-    if indirect == Indirect::Guide {
-        return Err(error(NO_GUIDE.to_string()).with_help(INSTEAD));
-    }
     match spec.cache() {
+        Some(cache) if cache.indirect == Indirect::None => {
+            Ok(spec.with_cache(CacheSpec::of(indirect)))
+        }
+        Some(cache)
+            if indirect == Indirect::Guide && cache.solve.solver != Solver::Hierarchical =>
+        {
+            Err(error(no_links(cache.solve.solver)).with_help(INSTEAD))
+        }
         Some(cache) => Ok(spec.with_cache(CacheSpec { indirect, ..cache })),
         None => {
             let name = spec.name();
@@ -153,5 +166,12 @@ pub fn overridden(
     }
 }
 
-const NO_GUIDE: &str = "walks that radiosity guides are not supported";
-const INSTEAD: &str = "use \"gather\", which reads radiosity, or \"none\"";
+/// Walks are guided by links.
+fn no_links(solver: Solver) -> String {
+    format!(
+        "the solver \"{}\" makes no links that walks could be guided by",
+        solver.name()
+    )
+}
+
+const INSTEAD: &str = "use the solver \"hierarchical\"";

@@ -1,0 +1,206 @@
+//! The camera's walk, sent where radiosity says that light comes from.
+//!
+//! At a vertex on a patch, a direction is found by the guide ([`crate::radiosity::guide`]) with probability a, by the
+//! BSDF otherwise, and counts by the density of both together (one-sample model of multiple importance sampling,
+//! Veach 1997, section 9.2.4, balance heuristic). What the guide's density is depends on the patch that the ray meets
+//! first, so the ray is traced before the direction is weighed.
+//!
+//! The guide aims at no emitter. Against light samples the BSDF's part of the density counts alone, (1 - a) times its
+//! own, on both sides: the two weights of a direction sum to 1 whichever way it was found.
+//!
+//! Roulette ends walks that are expected to bring little: what the edge's end sends back by the solution, times the
+//! throughput, against what the first patch on the walk is expected to send to the eye (Vorba & Křivánek 2016,
+//! "Adjoint-driven Russian roulette and splitting in light transport simulation", without their splitting).
+
+use crate::bsdf::{Bsdf, BsdfSample, Density, Mode};
+use crate::geom::Hit;
+use crate::math::{DVec2, PI, Rgb, Vec2};
+use crate::radiosity::Guide;
+use crate::radiosity::guide::Receiver;
+use crate::sampler::dim;
+use crate::scene::Scene;
+use crate::transport::PathStats;
+use crate::transport::path::{Gather, Gathered, Onward, Vertex};
+
+/// Guides one walk of the eye, which gathers beside what `gather` does.
+pub struct Guiding<'a, G> {
+    scene: &'a Scene,
+    guide: &'a Guide,
+    pub gather: G,
+    /// Patch of the current vertex, and the guide's share of the directions from there, if that is not 0.
+    place: Option<(Receiver, f32)>,
+    /// What the first patch on the walk is expected to bring, as luminance in the picture's units.
+    expected: Option<f32>,
+}
+
+/// A walk is ended only where it is expected to bring less than this share of what the pixel shows: the lower edge
+/// of a weight window whose upper edge is five times higher and whose middle is 1.
+const WINDOW: f32 = 1.0 / 3.0;
+/// No walk is ended with a greater probability than one less this: radiosity does not know all light.
+const LEAST_SURVIVAL: f32 = 0.1;
+
+impl<'a, G> Guiding<'a, G> {
+    pub fn new(scene: &'a Scene, guide: &'a Guide, gather: G) -> Guiding<'a, G> {
+        Guiding {
+            scene,
+            guide,
+            gather,
+            place: None,
+            expected: None,
+        }
+    }
+
+    /// Where the guide takes part at `vertex`, and with what share.
+    #[inline]
+    fn find_place(&mut self, vertex: &Vertex) -> Option<(Receiver, f32)> {
+        let diffuse = diffuse_part(vertex);
+        if diffuse == 0.0 {
+            return None;
+        }
+        let receiver = self.guide.receiver(vertex.hit)?;
+        if self.expected.is_none() {
+            let reflected = vertex.throughput * vertex.shading.diffuse_share();
+            let irradiance = self.guide.irradiance(receiver.patch());
+            self.expected = Some(reflected.luminance() * irradiance * (1.0 / PI));
+        }
+        let share = self.guide.share(receiver) * diffuse;
+        (share > 0.0).then_some((receiver, share))
+    }
+
+    /// A direction by either way, and what it meets if the guide takes part.
+    #[inline]
+    fn mixed(
+        &self,
+        vertex: &Vertex,
+        (receiver, share): (Receiver, f32),
+        u_lobe: f32,
+        u: Vec2,
+    ) -> Option<Onward> {
+        let (hit, shading) = (vertex.hit, vertex.shading);
+        let rest = 1.0 - share;
+        let block = dim::VERTEX + (vertex.edges - 1) * dim::PER_VERTEX + dim::PATCH;
+        let [coarse, fine, ..] = vertex.sampler.get4(block);
+        // Links of little light have smaller probabilities than one number in f32 can tell apart.
+        let choice = f64::from(coarse) + f64::from(fine) * STEP_OF_F32;
+        let by_guide = choice < f64::from(share);
+        let (wi, f_cos, bsdf_pdf, aimed) = if by_guide {
+            let choice = choice / f64::from(share);
+            let u = DVec2::new(f64::from(u.x), f64::from(u.y));
+            let aim = self.guide.sample(receiver, hit.p, choice, u)?;
+            let (f_cos, pdf) = shading.eval_pdf(aim.wi, Mode::Radiance);
+            if f_cos.is_black() {
+                return None;
+            }
+            (aim.wi, f_cos, pdf, Some(aim.patch))
+        } else {
+            let mut sample = shading.sample(u_lobe, u, Mode::Radiance)?;
+            let Density::PerSr(pdf) = sample.density else {
+                sample.weight *= 1.0 / rest;
+                return Some(Onward { sample, met: None });
+            };
+            (sample.wi, sample.weight * pdf, pdf, None)
+        };
+        let met = self.scene.intersect(&hit.spawn(wi));
+        let patch = met.as_ref().and_then(|met| self.guide.patch(met));
+        if aimed.is_some() && aimed != patch {
+            return None;
+        }
+        let guide_pdf = patch.map_or(0.0, |patch| self.guide.pdf(receiver, hit.p, wi, patch));
+        if aimed.is_some() && guide_pdf == 0.0 {
+            return None;
+        }
+        let sample = BsdfSample {
+            wi,
+            weight: f_cos * (1.0 / (share * guide_pdf + rest * bsdf_pdf)),
+            density: Density::PerSr(rest * bsdf_pdf),
+            eta: 1.0,
+        };
+        Some(Onward {
+            sample,
+            met: Some(met),
+        })
+    }
+}
+
+/// The step between two numbers of a sampler.
+const STEP_OF_F32: f64 = 1.0 / (1 << 24) as f64;
+
+/// How much of what the surface scatters it scatters diffusely; 0 for surfaces that the guide knows nothing of.
+#[inline]
+fn diffuse_part(vertex: &Vertex) -> f32 {
+    match vertex.shading.bsdf {
+        Bsdf::Diffuse(_) => 1.0,
+        Bsdf::Plastic(_) | Bsdf::RoughPlastic(_) => {
+            let diffuse = vertex.shading.diffuse_share().luminance();
+            let all = vertex.shading.albedo().luminance();
+            match diffuse > 0.0 && all > 0.0 {
+                true => (diffuse / all).min(1.0),
+                false => 0.0,
+            }
+        }
+        _ => 0.0,
+    }
+}
+
+impl<G: Gather> Gather for Guiding<'_, G> {
+    const TAKES_CAUSTICS: bool = G::TAKES_CAUSTICS;
+    const ENDS_EARLY: bool = true;
+
+    #[inline]
+    fn alone(&self) -> bool {
+        self.gather.alone()
+    }
+
+    #[inline]
+    fn at(&mut self, vertex: &Vertex, stats: &mut PathStats) -> Gathered {
+        self.gather.at(vertex, stats)
+    }
+
+    #[inline]
+    fn bsdf_share(&mut self, vertex: &Vertex) -> f32 {
+        self.place = self.find_place(vertex);
+        self.place.map_or(1.0, |(_, share)| 1.0 - share)
+    }
+
+    #[inline]
+    fn scatter(
+        &mut self,
+        vertex: &Vertex,
+        u_lobe: f32,
+        u: Vec2,
+        stats: &mut PathStats,
+    ) -> Option<Onward> {
+        match self.place.take() {
+            Some(place) => {
+                let onward = self.mixed(vertex, place, u_lobe, u);
+                if onward.is_none() {
+                    stats.indirect += 1;
+                }
+                onward
+            }
+            None => self.gather.scatter(vertex, u_lobe, u, stats),
+        }
+    }
+
+    #[inline]
+    fn survival(
+        &mut self,
+        throughput: Rgb,
+        eta2: f32,
+        met: Option<&Option<Hit>>,
+        roulette: bool,
+    ) -> f32 {
+        let known = || {
+            let (expected, met) = (self.expected?, met?.as_ref()?);
+            if self.scene.is_emitter(met.shape) || !(expected > 0.0) {
+                return None;
+            }
+            let radiance = self.guide.radiance(self.guide.patch(met)?);
+            Some(throughput.luminance() * radiance / expected)
+        };
+        match known() {
+            Some(ratio) => (ratio / WINDOW).clamp(LEAST_SURVIVAL, 1.0),
+            None => self.gather.survival(throughput, eta2, met, roulette),
+        }
+    }
+}
