@@ -138,16 +138,12 @@ fn pictures_of_steps_become_the_picture_of_the_result() {
         .collect();
     assert!(steps.is_sorted() && steps[0] < 0.95 * steps[3], "{steps:?}");
     assert!(folder.join("pictures/result.png").exists());
-    // A guess at the light on its way brings the first picture nearer to the result.
+    // With a guess at the light on its way, which is no part of the result.
     render(&["--show", "flat"]);
-    let (first, result) = (
-        mean("pictures/step-000001.exr"),
-        mean("pictures/result.exr"),
-    );
-    assert!(
-        (first - result).abs() < (steps[0] - result).abs(),
-        "{first} {result} {steps:?}"
-    );
+    let first = mean("pictures/step-000001.exr");
+    let result = mean("pictures/result.exr");
+    assert!(first > 1.5 * steps[0], "{first} {steps:?}");
+    assert!((result / steps[3] - 1.0).abs() < 0.2, "{result} {steps:?}");
 }
 
 #[test]
@@ -186,7 +182,7 @@ fn tells_what_is_wrong_and_with_what() {
             2,
             "--samples has no effect with form factors by hemicube",
         ),
-        (&["--patch-size", "-1"], 2, "expected a number above zero"),
+        (&["--patch-size", "0"], 2, "expected a number above zero"),
         (&["--no-ambient"], 2, "--snapshots"),
         (&["-o", "none/a.glb"], 3, "cannot write none/a.glb"),
         (&["-D", "bsdf=conductor", "-D", "x=1"], 1, "x"),

@@ -172,12 +172,15 @@ fn obj_holds_colours_and_places() {
             .collect()
     };
     let (positions, colors) = (triples(&read.positions), triples(&read.vertex_color));
-    assert_eq!(positions.len(), colored.positions.len());
-    for (i, p) in positions.iter().enumerate() {
-        assert!(p.distance(colored.positions[i] + CENTER) < 1e-9);
-        assert!(colors[i].distance(colored.colors[i]) < 1e-6);
-    }
+    // The reader numbers vertices as they are used first.
     let triangles = read.indices.as_chunks().0;
+    assert_eq!(triangles.len(), colored.triangles.len());
+    let written = colored.triangles.as_flattened();
+    for (&i, &k) in read.indices.iter().zip(written) {
+        let (i, k) = (i as usize, k as usize);
+        assert!(positions[i].distance(colored.positions[k] + CENTER) < 1e-9);
+        assert!(colors[i].distance(colored.colors[k]) < 1e-6);
+    }
     assert!((area(&positions, triangles) / mesh.area() - 1.0).abs() < 1e-9);
     assert_eq!(read.normals.len(), read.positions.len());
 }
