@@ -10,7 +10,7 @@
 //! while what they stand for may be curved: a direction that meets the surface of q, but passes beside its flat
 //! piece, is never aimed at, and has density 0.
 
-use super::{Piece, Rgb64, Solution};
+use super::{Outline, Patch, Piece, Rgb64, Solution};
 use crate::geom::Hit;
 use crate::math::{DVec2, DVec3, Vec3};
 use crate::scene::Scene;
@@ -26,8 +26,8 @@ pub struct Guide {
     senders: Vec<Sender>,
     /// Power in W, as luminance and without emitters, of all patches before each; one more than there are patches.
     power: Vec<f64>,
-    /// By patch: share of the directions that are best found here (see [`Guide::share`]).
-    shares: Vec<f32>,
+    /// By patch.
+    flats: Vec<Flat>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -58,15 +58,6 @@ struct Sender {
 #[derive(Clone, Copy, Debug)]
 pub struct Receiver {
     node: u32,
-    patch: u32,
-}
-
-impl Receiver {
-    /// Number of the patch.
-    #[inline]
-    pub fn patch(self) -> u32 {
-        self.patch
-    }
 }
 
 /// A point that was aimed at.
@@ -130,37 +121,31 @@ impl Guide {
                 total: own + parent.map_or(0.0, |p| p.total),
             });
         }
-        let mut guide = Guide {
+        let flat = |(i, patch): (usize, &Patch)| {
+            Flat::new(&patch.piece, below(&power, i as u32, i as u32 + 1))
+        };
+        let flats = patches.par_iter().enumerate().map(flat).collect();
+        Some(Guide {
             nodes,
             senders,
             power,
-            shares: Vec::new(),
+            flats,
             solution,
-        };
-        guide.shares = guide.find_shares(&area);
-        Some(guide)
+        })
     }
 
-    /// The patch at `hit` on the side of `hit.wo`, if links bring light to it.
+    /// A patch, if links bring light to it.
     #[inline]
-    pub fn receiver(&self, hit: &Hit) -> Option<Receiver> {
-        let patch = self.patch(hit)?;
+    pub fn receiver(&self, patch: u32) -> Option<Receiver> {
         let node = *self.solution.hierarchy.as_ref()?.leaf.get(patch as usize)?;
         let total = self.nodes[node as usize].total;
-        (total > 0.0).then_some(Receiver { node, patch })
+        (total > 0.0).then_some(Receiver { node })
     }
 
     /// The patch at `hit` on the side of `hit.wo`.
     #[inline]
     pub fn patch(&self, hit: &Hit) -> Option<u32> {
         Some(self.solution.mesh.locate(hit)?.patch)
-    }
-
-    /// Share of the directions, in [0, 1), that are best found here, if the others follow the cosine: 0 where light
-    /// comes evenly from everywhere.
-    #[inline]
-    pub fn share(&self, receiver: Receiver) -> f32 {
-        self.shares[receiver.patch as usize]
     }
 
     /// Irradiance of a patch in W/m², as luminance.
@@ -197,10 +182,9 @@ impl Guide {
             return 0.0;
         }
         let total = self.nodes[receiver.node as usize].total;
-        let power = self.power[patch as usize + 1] - self.power[patch as usize];
-        let q = &self.solution.mesh.patches[patch as usize];
-        let pdf_a = per_power * (power / (total * q.area));
-        bounded(pdf_a * sr_per_area(&q.piece, p.as_dvec3(), wi.as_dvec3()))
+        let flat = &self.flats[patch as usize];
+        let pdf_a = per_power * (flat.exitance / total);
+        bounded(pdf_a * flat.area_per_sr(p.as_dvec3(), wi.as_dvec3()))
     }
 
     /// Irradiance that the link by which `patch` sends to `receiver` brings per power of its sender, in 1/m²; 0
@@ -249,19 +233,54 @@ impl Guide {
     }
 }
 
-/// Steradians at `p`, per area of `piece`, in direction `wi`, are one over this: squared distance over cosine. 0 where
-/// the line along `wi` does not pass through the piece from its front.
-#[inline]
-fn sr_per_area(piece: &Piece, p: DVec3, wi: DVec3) -> f64 {
-    let n = piece.normal();
-    let cos = -wi.dot(n);
-    if !(cos > 0.0) {
-        return 0.0;
+/// The flat piece of a patch, made ready to be met.
+#[derive(Clone, Copy, Debug)]
+struct Flat {
+    o: DVec3,
+    /// Unit normal.
+    n: DVec3,
+    /// What `p - o` is multiplied with for the coordinates of `p` in the piece.
+    s: DVec3,
+    t: DVec3,
+    outline: Outline,
+    /// In W/m², as luminance and without emitters.
+    exitance: f64,
+}
+
+impl Flat {
+    fn new(piece: &Piece, power: f64) -> Flat {
+        let n = piece.normal();
+        // |e1 x e2|, as e1 x e2 is along n.
+        let whole = piece.cross().dot(n);
+        Flat {
+            o: piece.o,
+            n,
+            s: piece.e2.cross(n) / whole,
+            t: n.cross(piece.e1) / whole,
+            outline: piece.outline,
+            exitance: positive(power / piece.area()),
+        }
     }
-    let distance = (p - piece.o).dot(n) / cos;
-    match distance > 0.0 && piece.outline.contains(piece.locate(p + wi * distance)) {
-        true => distance * distance / cos,
-        false => 0.0,
+
+    /// Area of the piece per steradian at `p` in the unit direction `wi`: squared distance over cosine. 0 where the
+    /// line along `wi` does not pass through the piece from its front.
+    #[inline]
+    fn area_per_sr(&self, p: DVec3, wi: DVec3) -> f64 {
+        let cos = -wi.dot(self.n);
+        let height = (p - self.o).dot(self.n);
+        let faces = cos > 0.0 && height > 0.0;
+        if !faces {
+            return 0.0;
+        }
+        let distance = height / cos;
+        let d = p + wi * distance - self.o;
+        match self
+            .outline
+            .contains(DVec2::new(d.dot(self.s), d.dot(self.t)))
+        {
+            true => distance * distance / cos,
+            false => 0.0,
+        }
     }
 }
 
@@ -279,74 +298,4 @@ fn positive(x: f64) -> f64 {
 
 fn luminance(c: Rgb64) -> f64 {
     c.dot(Rgb64::new(0.212_671, 0.715_160, 0.072_169))
-}
-
-/// Light of one receiver by its radiosity: form factor and irradiance, in steps of factors of 2 from the brightest
-/// sender down.
-#[derive(Clone, Copy, Default)]
-struct Brightness([[f64; 2]; 16]);
-
-/// Share of the directions found by links that meet what they aim at, and bring what they promise.
-const FOUND: f64 = 0.6;
-/// A share of directions that lowers the variance by less than this is not worth its costs.
-const WORTH: f64 = 0.1;
-/// No larger share is taken: light that radiosity knows nothing of comes by the others.
-const MOST: u32 = 8;
-
-impl Guide {
-    /// By patch: the share of directions by links for which the variance is least. With share a, directions to a
-    /// sender of radiosity b have the density a b/E + 1 - a, relative to the cosine's, where E is all irradiance: so
-    /// the second moment is Σ F b² / (a b/E + 1 - a).
-    fn find_shares(&self, area: &[f64]) -> Vec<f32> {
-        let brightest = self.senders.iter().map(|s| self.radiosity(s, area));
-        let brightest = brightest.fold(0.0, f64::max);
-        let hierarchy = self.solution.hierarchy.as_ref();
-        let leaves = hierarchy.map_or(&[][..], |h| &h.leaf);
-        let find = |&leaf: &u32| {
-            let mut light = Brightness::default();
-            let mut number = leaf;
-            while let Some(node) = self.nodes.get(number as usize) {
-                for sender in &self.senders[node.first as usize..node.end as usize] {
-                    let b = self.radiosity(sender, area);
-                    let step = -(b / brightest).log2();
-                    let size = f64::from(sender.end - sender.first);
-                    debug_assert!(size > 0.0);
-                    let f = sender.per_power
-                        * (area[sender.end as usize] - area[sender.first as usize]);
-                    let [form_factor, irradiance] = &mut light.0[(step as usize).min(15)];
-                    *form_factor += f;
-                    *irradiance += f * b;
-                }
-                number = node.above;
-            }
-            light.best_share()
-        };
-        leaves.par_iter().map(find).collect()
-    }
-
-    /// Mean radiosity of a sender in W/m².
-    fn radiosity(&self, sender: &Sender, area: &[f64]) -> f64 {
-        let (first, end) = (sender.first as usize, sender.end as usize);
-        (self.power[end] - self.power[first]) / (area[end] - area[first])
-    }
-}
-
-impl Brightness {
-    fn best_share(&self) -> f32 {
-        let all: f64 = self.0.iter().map(|[_, e]| e).sum();
-        let moment = |share: f64| -> f64 {
-            let part = |&[f, e]: &[f64; 2]| match f > 0.0 {
-                true => (e / f) * e / (share * FOUND * (e / f) / all + 1.0 - share),
-                false => 0.0,
-            };
-            self.0.iter().map(part).sum()
-        };
-        let none = moment(0.0);
-        let shares = (1..=MOST).map(|i| f64::from(i) * 0.1);
-        let best = shares.min_by(|a, b| moment(*a).total_cmp(&moment(*b)));
-        match best {
-            Some(share) if moment(share) < (1.0 - WORTH) * none => share as f32,
-            _ => 0.0,
-        }
-    }
 }

@@ -13,8 +13,8 @@
 //! "Adjoint-driven Russian roulette and splitting in light transport simulation", without their splitting).
 
 use crate::bsdf::{Bsdf, BsdfSample, Density, Mode};
-use crate::geom::Hit;
-use crate::math::{DVec2, PI, Rgb, Vec2};
+use crate::geom::{Hit, ShapeId};
+use crate::math::{DVec2, PI, Rgb, Vec2, Vec3};
 use crate::radiosity::Guide;
 use crate::radiosity::guide::Receiver;
 use crate::sampler::dim;
@@ -27,15 +27,35 @@ pub struct Guiding<'a, G> {
     scene: &'a Scene,
     guide: &'a Guide,
     pub gather: G,
-    /// Patch of the current vertex, and the guide's share of the directions from there, if that is not 0.
-    place: Option<(Receiver, f32)>,
+    /// Of the current vertex, where the guide takes part.
+    place: Option<Place>,
+    /// What the edge from there meets, and the patch there, where that was found out.
+    ahead: Option<Ahead>,
     /// What the first patch on the walk is expected to bring, as luminance in the picture's units.
     expected: Option<f32>,
 }
 
-/// A walk is ended only where it is expected to bring less than this share of what the pixel shows: the lower edge
-/// of a weight window whose upper edge is five times higher and whose middle is 1.
-const WINDOW: f32 = 1.0 / 3.0;
+/// Where the guide takes part.
+#[derive(Clone, Copy)]
+struct Place {
+    receiver: Receiver,
+    /// Of the directions that the guide finds.
+    share: f32,
+}
+
+/// The patch at a hit, if it has one.
+#[derive(Clone, Copy)]
+struct Ahead {
+    p: Vec3,
+    shape: ShapeId,
+    patch: Option<u32>,
+}
+
+/// Share of the directions from a diffuse surface that the guide finds. No direction counts for more than 1 / (1 - a)
+/// of what it would without a guide, however wrong the solution is; 0.3 to 0.5 measured much alike, 0.7 worse.
+const SHARE: f32 = 0.4;
+/// A walk is ended only where it is expected to bring less than this share of what the pixel shows.
+const WINDOW: f32 = 0.15;
 /// No walk is ended with a greater probability than one less this: radiosity does not know all light.
 const LEAST_SURVIVAL: f32 = 0.1;
 
@@ -46,33 +66,39 @@ impl<'a, G> Guiding<'a, G> {
             guide,
             gather,
             place: None,
+            ahead: None,
             expected: None,
         }
     }
 
-    /// Where the guide takes part at `vertex`, and with what share.
+    /// Where the guide takes part at `vertex`.
     #[inline]
-    fn find_place(&mut self, vertex: &Vertex) -> Option<(Receiver, f32)> {
+    fn find_place(&mut self, vertex: &Vertex) -> Option<Place> {
         let diffuse = diffuse_part(vertex);
         if diffuse == 0.0 {
             return None;
         }
-        let receiver = self.guide.receiver(vertex.hit)?;
+        let hit = vertex.hit;
+        let patch = match self.ahead.take() {
+            Some(ahead) if ahead.p == hit.p && ahead.shape == hit.shape => ahead.patch,
+            _ => self.guide.patch(hit),
+        }?;
+        let receiver = self.guide.receiver(patch)?;
         if self.expected.is_none() {
             let reflected = vertex.throughput * vertex.shading.diffuse_share();
-            let irradiance = self.guide.irradiance(receiver.patch());
+            let irradiance = self.guide.irradiance(patch);
             self.expected = Some(reflected.luminance() * irradiance * (1.0 / PI));
         }
-        let share = self.guide.share(receiver) * diffuse;
-        (share > 0.0).then_some((receiver, share))
+        let share = SHARE * diffuse;
+        Some(Place { receiver, share })
     }
 
     /// A direction by either way, and what it meets if the guide takes part.
     #[inline]
     fn mixed(
-        &self,
+        &mut self,
         vertex: &Vertex,
-        (receiver, share): (Receiver, f32),
+        Place { receiver, share }: Place,
         u_lobe: f32,
         u: Vec2,
     ) -> Option<Onward> {
@@ -101,7 +127,12 @@ impl<'a, G> Guiding<'a, G> {
             (sample.wi, sample.weight * pdf, pdf, None)
         };
         let met = self.scene.intersect(&hit.spawn(wi));
-        let patch = met.as_ref().and_then(|met| self.guide.patch(met));
+        self.ahead = met.as_ref().map(|met| Ahead {
+            p: met.p,
+            shape: met.shape,
+            patch: self.guide.patch(met),
+        });
+        let patch = self.ahead.and_then(|ahead| ahead.patch);
         if aimed.is_some() && aimed != patch {
             return None;
         }
@@ -159,7 +190,8 @@ impl<G: Gather> Gather for Guiding<'_, G> {
     #[inline]
     fn bsdf_share(&mut self, vertex: &Vertex) -> f32 {
         self.place = self.find_place(vertex);
-        self.place.map_or(1.0, |(_, share)| 1.0 - share)
+        self.ahead = None;
+        self.place.map_or(1.0, |place| 1.0 - place.share)
     }
 
     #[inline]
@@ -192,10 +224,10 @@ impl<G: Gather> Gather for Guiding<'_, G> {
     ) -> f32 {
         let known = || {
             let (expected, met) = (self.expected?, met?.as_ref()?);
-            if self.scene.is_emitter(met.shape) || !(expected > 0.0) {
+            if self.scene.is_emitter(met.shape) || expected.is_nan() || expected <= 0.0 {
                 return None;
             }
-            let radiance = self.guide.radiance(self.guide.patch(met)?);
+            let radiance = self.guide.radiance(self.ahead?.patch?);
             Some(throughput.luminance() * radiance / expected)
         };
         match known() {

@@ -131,7 +131,7 @@ pub struct RadiositySpec {
 const CACHED_EDGES: u32 = 4;
 
 /// Greatest error of a link where radiosity guides walks (see [`SolveSpec::error`]).
-pub const GUIDE_ERROR: f64 = 1e-3;
+pub const GUIDE_ERROR: f64 = 1e-4;
 
 impl CacheSpec {
     /// What is made of light between diffuse surfaces, with a solution as good as that needs.

@@ -148,13 +148,14 @@ pub fn overridden(
         );
     };
     match spec.cache() {
-        Some(cache) if cache.indirect == Indirect::None => {
-            Ok(spec.with_cache(CacheSpec::of(indirect)))
-        }
         Some(cache)
             if indirect == Indirect::Guide && cache.solve.solver != Solver::Hierarchical =>
         {
             Err(error(no_links(cache.solve.solver)).with_help(INSTEAD))
+        }
+        // Nothing was asked of the solution.
+        Some(cache) if cache.solve == SolveSpec::default() => {
+            Ok(spec.with_cache(CacheSpec::of(indirect)))
         }
         Some(cache) => Ok(spec.with_cache(CacheSpec { indirect, ..cache })),
         None => {
