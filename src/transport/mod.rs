@@ -367,10 +367,8 @@ impl<'a> Transport<'a> {
 /// The path tracer, with a cache if there is anything to read from it.
 fn with_cache<'a>(path: &'a PathSpec, cache: &'a CacheSpec, setting: Setting<'a>) -> Work<'a> {
     match cache.is_used(setting.scene, path) {
-        Ok(()) if cache.indirect == Indirect::Gather => {
-            Work::Cached(radiosity::CachedPath::new(path, cache, setting))
-        }
-        _ => Work::Path(path),
+        Ok(()) => Work::Cached(radiosity::CachedPath::new(path, cache, setting)),
+        Err(_) => Work::Path(path),
     }
 }
 

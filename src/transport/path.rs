@@ -7,7 +7,7 @@ use crate::math::{Rgb, Vec2};
 use crate::sampler::Sampler;
 use crate::scene::Scene;
 
-use super::{Connect, Li, Mis, PathStats, VertexNumbers, direct_light};
+use super::{Connect, Drawn, Li, Mis, PathStats, VertexNumbers, direct_light};
 
 /// Longest path, in path vertices after the camera, when none is asked for: longer ones are cut. Only a
 /// closed scene of albedo 1 without Russian roulette gets here.
@@ -324,37 +324,13 @@ impl PathSpec {
                     sampler: &sampler,
                     throughput,
                 };
-                let mut connected = !gather.alone();
-                let mut mis = Mis::Power {
-                    bsdf_per_light: gather.bsdf_share(&vertex),
-                };
-                match gather.at(&vertex, stats) {
-                    Gathered::Nothing => {}
-                    Gathered::Also(found) => lo += throughput * found,
-                    Gathered::Instead(found) => {
-                        lo += throughput * found;
-                        settled = true;
-                        connected = false;
-                    }
-                    Gathered::Reflected(found) => {
-                        lo += throughput * found;
-                        settled = true;
-                        // No walk will meet the emitter instead.
-                        mis = Mis::LightOnly;
-                    }
-                    Gathered::Diffuse(found) => {
-                        lo += throughput * found;
-                        match shading.without_diffuse() {
-                            Some(others) => shading = others,
-                            None => break,
-                        }
-                    }
-                }
-                if connected {
-                    let passes = max_depth - depth - 2;
-                    let connect = Connect { mis, passes };
-                    let lit = direct_light(scene, &hit, &shading, connect, u.pick, u.light, stats);
-                    lo += throughput * lit;
+                let (found, left) = light_at(scene, &vertex, gather, &u, max_depth, stats);
+                lo += throughput * found;
+                match left {
+                    Left::All => {}
+                    Left::Delta => settled = true,
+                    Left::Others(others) => shading = others,
+                    Left::Nothing => break,
                 }
             }
             let vertex = Vertex {
@@ -411,6 +387,57 @@ impl PathSpec {
         }
         Li { radiance: lo, seen }
     }
+}
+
+/// The lobes of a vertex that lead a walk on.
+enum Left {
+    All,
+    Delta,
+    Others(Shading),
+    Nothing,
+}
+
+/// Radiance that leaves a vertex by what is gathered there and by a connection to an emitter, and what leads on.
+#[inline]
+fn light_at<G: Gather>(
+    scene: &Scene,
+    vertex: &Vertex,
+    gather: &mut G,
+    u: &Drawn,
+    max_depth: u32,
+    stats: &mut PathStats,
+) -> (Rgb, Left) {
+    let mut mis = Mis::Power {
+        bsdf_per_light: gather.bsdf_share(vertex),
+    };
+    let (gathered, left) = match gather.at(vertex, stats) {
+        Gathered::Nothing => (Rgb::BLACK, Left::All),
+        Gathered::Also(found) => (found, Left::All),
+        Gathered::Instead(found) => return (found, Left::Delta),
+        Gathered::Reflected(found) => {
+            // No walk will meet the emitter instead.
+            mis = Mis::LightOnly;
+            (found, Left::Delta)
+        }
+        Gathered::Diffuse(found) => match vertex.shading.without_diffuse() {
+            Some(others) => (found, Left::Others(others)),
+            None => return (found, Left::Nothing),
+        },
+    };
+    if gather.alone() {
+        return (gathered, left);
+    }
+    let shading = match &left {
+        Left::Others(others) => others,
+        _ => vertex.shading,
+    };
+    let connect = Connect {
+        mis,
+        passes: max_depth - vertex.edges - 1,
+    };
+    let hit = vertex.hit;
+    let direct = direct_light(scene, hit, shading, connect, u.pick, u.light, stats);
+    (gathered + direct, left)
 }
 
 impl DirectSpec {

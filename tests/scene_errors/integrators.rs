@@ -124,17 +124,17 @@ fn radiosity_without_use_or_effect() {
             "<integrator type='path'><string name='indirect' value='guide'/>\n<string name='solver' value='gauss'/></integrator>",
         ),
         r#"
-a.xml:4:31: the solver "gauss" makes no links that walks could be guided by
+a.xml:4:23: the solver "gauss" makes no links that walks could be guided by
   <string name='solver' value='gauss'/></integrator>
-                              ^
+                        ^
   help: use the solver "hierarchical""#,
     );
     says(
         of("<integrator type='path'><string name='solver' value='gauss'/></integrator>"),
         r#"
-a.xml:3:55: "solver" has no effect without radiosity
+a.xml:3:47: "solver" has no effect without radiosity
   <integrator type='path'><string name='solver' value='gauss'/></integrator>
-                                                       ^
+                                                ^
   help: leave it out, or set "indirect" to "gather" or "guide""#,
     );
     says(
@@ -142,25 +142,25 @@ a.xml:3:55: "solver" has no effect without radiosity
             "<integrator type='radiosity'><string name='solver' value='gauss'/><float name='error' value='1'/></integrator>",
         ),
         r#"
-a.xml:3:93: "error" has no effect with the solver "gauss"
+a.xml:3:87: "error" has no effect with the solver "gauss"
   <integrator type='radiosity'><string name='solver' value='gauss'/><float name='error' value='1'/></integrator>
-                                                                                              ^
+                                                                                        ^
   help: leave it out, or use the solver "hierarchical""#,
     );
     says(
         of("<integrator type='radiosity'><integer name='resolution' value='64'/></integrator>"),
         r#"
-a.xml:3:65: "resolution" has no effect with form factors by "analytic"
+a.xml:3:57: "resolution" has no effect with form factors by "analytic"
   <integrator type='radiosity'><integer name='resolution' value='64'/></integrator>
-                                                                 ^
+                                                          ^
   help: use "samples""#,
     );
     says(
         of("<integrator type='radiosity'><string name='show' value='smooth'/></integrator>"),
         r#"
-a.xml:3:58: "show" must be one of "flat", "gouraud", "gather", not "smooth"
+a.xml:3:50: "show" must be one of "flat", "gouraud", "gather", not "smooth"
   <integrator type='radiosity'><string name='show' value='smooth'/></integrator>
-                                                          ^"#,
+                                                   ^"#,
     );
     let asking = |integrator: Option<&str>, indirect: &str| {
         let asked = Overrides {

@@ -101,12 +101,13 @@ impl Base {
     }
 
     /// Share of light from everywhere that [`Base::diffuse`] reflects: both of its shapes are polynomials in the
-    /// roughness, whose coefficients were integrated over both hemispheres.
+    /// roughness, whose coefficients were integrated over both hemispheres. Rough white reflects up to 7 % more than
+    /// all.
     pub(super) fn diffuse_albedo(&self) -> Rgb {
         let r = self.roughness;
         let burley = 0.952_948 + r * (0.108_702 + r * 0.003_519);
         let flat = 0.939_110 + r * (0.043_684 + r * 0.002_135);
-        self.color * (burley + (flat - burley) * self.flatness).min(1.0)
+        self.color * (burley + (flat - burley) * self.flatness)
     }
 
     /// Sheen in 1/sr (Burley 2012, section 5.6).

@@ -316,36 +316,51 @@ impl Field {
 
     /// Means and intensities of the clusters, by what they contain.
     fn pull(&mut self, tree: &Tree) {
-        self.intensity.clear();
-        self.intensity
-            .resize(tree.by_cluster.len(), Sphere::default());
+        let own = |&cluster: &u32| self.of_surfaces(tree, cluster);
+        let mut sums: Vec<Sum> = tree.by_cluster.par_iter().map(own).collect();
+        // Clusters come before what they contain.
         for (number, &i) in tree.by_cluster.iter().enumerate().rev() {
-            let i = i as usize;
-            let node = &tree.nodes[i];
-            let (mut power, mut arriving) = (Rgb64::ZERO, Rgb64::ZERO);
-            let mut sum = Sphere::default();
-            for child in tree.children(i as u32).map(|c| c as usize) {
-                let inside = &tree.nodes[child];
-                power += self.radiosity[child] * inside.area;
-                arriving += self.irradiance[child] * inside.area;
-                match inside.kind {
-                    Kind::Surface { .. } => {
-                        sum.add_surface(self.radiosity[child], inside.area, inside.normal);
-                    }
-                    Kind::Cluster { .. } => {
-                        let inside = self.intensity[tree.clusters[child] as usize];
-                        sum.add(&inside);
-                    }
-                }
+            let node = &tree.nodes[i as usize];
+            let sum = sums[number];
+            if let Some(&above) = tree.clusters.get(node.parent as usize) {
+                let above = &mut sums[above as usize];
+                above.power += sum.power;
+                above.arriving += sum.arriving;
+                above.intensity.add(&sum.intensity);
             }
             let share = if node.area > 0.0 {
                 1.0 / node.area
             } else {
                 0.0
             };
-            self.radiosity[i] = power * share;
-            self.irradiance[i] = arriving * share;
-            self.intensity[number] = sum;
+            self.radiosity[i as usize] = sum.power * share;
+            self.irradiance[i as usize] = sum.arriving * share;
         }
+        self.intensity = sums.into_iter().map(|sum| sum.intensity).collect();
     }
+
+    /// What the surfaces directly in a cluster send and get.
+    fn of_surfaces(&self, tree: &Tree, cluster: u32) -> Sum {
+        let mut sum = Sum::default();
+        for child in tree.children(cluster).map(|c| c as usize) {
+            let inside = &tree.nodes[child];
+            if inside.is_cluster() {
+                continue;
+            }
+            sum.power += self.radiosity[child] * inside.area;
+            sum.arriving += self.irradiance[child] * inside.area;
+            sum.intensity
+                .add_surface(self.radiosity[child], inside.area, inside.normal);
+        }
+        sum
+    }
+}
+
+/// Of all that is in a cluster.
+#[derive(Clone, Copy, Default)]
+struct Sum {
+    /// In W, sent and received.
+    power: Rgb64,
+    arriving: Rgb64,
+    intensity: Sphere,
 }

@@ -58,6 +58,8 @@ pub struct Hierarchy {
 const STEP: f64 = 4.0;
 /// Refinements before the last, at most.
 const LOOSER: i32 = 4;
+/// Gathering steps before each refinement but the first, at most.
+const LOOKS: u64 = 5;
 /// Irradiance that is no more than this share of the mean is not resolved better than that.
 const BLACK: f64 = 1e-3;
 /// Gathering steps after the last refinement, at most, when no other limit is given.
@@ -90,16 +92,16 @@ pub fn solve(
         report.form_factor_seconds += clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         // Before the last refinement, it is enough to see where light goes.
-        let wanted = match looser {
-            0 => spec.residual,
-            _ => spec.residual.max(0.02),
+        let (wanted, until) = match looser {
+            0 => (spec.residual, most),
+            _ => (spec.residual.max(0.02), most.min(report.steps + LOOKS)),
         };
         loop {
             report.residual = field.step(&tree) / emitted.element_sum().max(f64::MIN_POSITIVE);
             report.steps += 1;
             report.converged = looser == 0 && report.residual <= wanted;
             let growing = !report.residual.is_finite();
-            if report.residual <= wanted || report.steps >= most || growing {
+            if report.residual <= wanted || report.steps >= until || growing {
                 break;
             }
         }

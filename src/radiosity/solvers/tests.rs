@@ -37,7 +37,7 @@ fn furnace(albedo: f64, exitance: f64) -> Scene {
     scene(&format!(
         "<shape type='cube'><boolean name='flip_normals' value='true'/>\
          <bsdf type='diffuse'><spectrum name='reflectance' value='{albedo}'/></bsdf>\
-         <emitter type='area'><spectrum name='radiance' value='{}'/></emitter></shape>",
+         <emitter type='area'><rgb name='radiance' value='{}'/></emitter></shape>",
         exitance / std::f64::consts::PI
     ))
 }
