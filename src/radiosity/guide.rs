@@ -255,7 +255,7 @@ impl Guide {
 fn sr_per_area(piece: &Piece, p: DVec3, wi: DVec3) -> f64 {
     let n = piece.normal();
     let cos = -wi.dot(n);
-    if !(cos > 0.0) {
+    if cos.is_nan() || cos <= 0.0 {
         return 0.0;
     }
     let distance = (p - piece.o).dot(n) / cos;

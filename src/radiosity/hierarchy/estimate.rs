@@ -156,7 +156,7 @@ fn visibility(scene: &Scene, hit: &Hit, ends: &[Hit; 4], first: usize, rays: usi
 
 fn blocked(scene: &Scene, from: &Hit, to: &Endpoint) -> bool {
     let ray = from.spawn_to(to);
-    !(ray.t_max > 0.0) || scene.transmittance(&ray, PASSES) < 0.5
+    ray.t_max <= 0.0 || scene.transmittance(&ray, PASSES) < 0.5
 }
 
 /// Surfaces that a ray may pass through.

@@ -145,7 +145,7 @@ impl Field {
     /// What is darker than `black`, as a share of the mean, counts as that dark.
     pub fn judge_by(&mut self, tree: &Tree, black: f64) {
         let mean = self.irradiance[0].max_element();
-        if !(mean > 0.0) {
+        if mean.is_nan() || mean <= 0.0 {
             self.usual = vec![self.radiosity[0].max_element(); tree.nodes.len()];
             return;
         }

@@ -192,7 +192,7 @@ impl<G: Gather> Gather for Guiding<'_, G> {
     ) -> f32 {
         let known = || {
             let (expected, met) = (self.expected?, met?.as_ref()?);
-            if self.scene.is_emitter(met.shape) || !(expected > 0.0) {
+            if self.scene.is_emitter(met.shape) || expected.is_nan() || expected <= 0.0 {
                 return None;
             }
             let radiance = self.guide.radiance(self.guide.patch(met)?);
