@@ -253,6 +253,26 @@ fn the_bias_that_is_reported_is_the_one_there_is() {
 }
 
 #[test]
+fn what_photons_bring_is_not_read_too() {
+    // Half of the room's light comes by way of the mirror: to count that twice would show.
+    let mirror = r#"<shape type="rectangle"><transform name="to_world"><scale value="1.9"/>
+        <rotate x="1" angle="-90"/><translate y="-1.98"/></transform>
+        <bsdf type="conductor"><string name="material" value="none"/></bsdf></shape>"#;
+    let mut compiled = compile(&room(&(LAMP.to_string() + mirror)));
+    let (_, all, _) = look(&mut compiled, combined(CacheSpec::default()), 256);
+    let (_, read, _) = look(
+        &mut compiled,
+        combined(CacheSpec::of(Indirect::Gather)),
+        256,
+    );
+    let noise = 4.5 * all.1.hypot(read.1);
+    assert!(
+        read.0 < 1.005 * all.0 + noise && noise < 0.02 * all.0,
+        "{read:?} {all:?}"
+    );
+}
+
+#[test]
 fn threads_do_not_change_the_picture() {
     for integrator in [
         cached(gather(None)),

@@ -84,6 +84,9 @@ fn writes_meshes_and_statistics_and_says_what_was_solved() {
             serde_json::from_slice(&fs::read(folder.join("s.json")).unwrap()).unwrap();
         assert_eq!(stats["solver"], solver);
         assert_eq!(stats["converged"], true);
+        let rows = &stats["closure"]["row_sum"];
+        assert_eq!(rows.is_array(), solver == "gauss-seidel");
+        assert_eq!(said.contains("reciprocity"), rows.is_array());
         // Lamp of radiance 5, 4, 3 and area 0.36: π L A.
         let emitted = stats["watts"]["emitted"][0].as_f64().unwrap();
         assert!(

@@ -28,7 +28,8 @@ pub struct RenderArgs {
     /// Use this integrator in place of the scene's
     #[arg(long, value_name = "NAME")]
     pub integrator: Option<String>,
-    /// How a path tracer finds light between diffuse surfaces: none (by itself), gather (from radiosity)
+    /// How a path tracer finds light between diffuse surfaces: none (by itself), gather (read from radiosity,
+    /// biased), guide (radiosity says where walks go, unbiased)
     #[arg(long, value_name = "WAY")]
     pub indirect: Option<String>,
     /// Use this sampler in place of the scene's: sobol, independent

@@ -157,6 +157,8 @@ pub struct Report {
     pub escaped: Rgb64,
     /// Share of the light that arrives at patches that they scatter in ways which radiosity leaves out.
     pub other: f64,
+    /// How well the form factors keep what must hold of them; `None` of solvers that never have all of them.
+    pub quality: Option<form_factors::Quality>,
     /// Sentences for the user: what was left out and why.
     pub warnings: Vec<String>,
     pub mesh_seconds: f64,

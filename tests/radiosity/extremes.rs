@@ -56,7 +56,7 @@ fn odd_geometry_gives_finite_numbers() {
         )
         + &shape("cube", "<translate x='2'/>", &two);
     for (body, size) in [
-        (mesh("radiosity_needles.obj", needles), 10.0),
+        (mesh("radiosity_needles.obj", needles), 60.0),
         (mesh("radiosity_twice.obj", twice), 0.5),
         (mesh("radiosity_sizes.obj", sizes), 200.0),
         (cubes, 0.7),

@@ -22,7 +22,7 @@ use crate::image_io;
 use crate::radiosity::export::{ColoredMesh, ExportSpec, MeshFormat};
 use crate::radiosity::{self, Display, Solution};
 use crate::scene::Scene;
-use crate::transport::IntegratorSpec;
+use crate::transport::{Indirect, IntegratorSpec};
 use snapshots::Snapshots;
 
 /// Seconds of what goes around solving.
@@ -179,6 +179,9 @@ fn write_meshes(
 fn of_scene(integrator: &IntegratorSpec) -> Option<radiosity::SolveSpec> {
     match integrator {
         IntegratorSpec::Radiosity(spec) => Some(spec.solve.clone()),
-        other => other.cache().map(|cache| cache.solve),
+        // Where nothing is read, its settings are not meant for looking at.
+        other => (other.cache())
+            .filter(|cache| cache.indirect != Indirect::None)
+            .map(|cache| cache.solve),
     }
 }

@@ -23,6 +23,12 @@ pub(super) fn table(spec: &SolveSpec, solution: &Solution, seconds: &Seconds) ->
         Solver::Hierarchical => lines.push(("links", r.links.to_string())),
         _ => lines.push(("form factors", form_factors(spec.form_factors))),
     }
+    if let Some(quality) = &r.quality {
+        let names = ["closure", "", ""];
+        let said = quality.to_string();
+        let said = said.lines().map(str::to_string);
+        lines.extend(names.into_iter().zip(said));
+    }
     let reached = match r.converged {
         true => String::new(),
         false => format!(", {:e} was asked for and not reached", spec.residual),
@@ -119,11 +125,25 @@ pub(super) fn statistics(
             json!({ "method": spec.form_factors.name(), "samples": samples })
         }
     });
+    let quality = r.quality.as_ref().map(|q| {
+        json!({
+            "row_sum": [q.row_sum_min, q.row_sum_mean, q.row_sum_max],
+            "rows_off": q.rows_off,
+            "row_tolerance": q.row_tolerance,
+            "reciprocity_rms": q.reciprocity_rms,
+            "reciprocity_max": q.reciprocity_max,
+            "self_max": q.self_max,
+            "lost_pairs": q.lost_pairs,
+            "lost_share": q.lost_share,
+            "lost_patches": q.lost_patches,
+        })
+    });
     json!({
         "version": env!("CARGO_PKG_VERSION"),
         "scene": scene,
         "solver": spec.solver.name(),
         "form_factors": method,
+        "closure": quality,
         "discontinuities": spec.discontinuities,
         "threads": threads,
         "patches": r.patches,

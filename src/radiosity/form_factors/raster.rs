@@ -55,11 +55,22 @@ impl Buffer {
     pub fn draw(&mut self, polygon: &Polygon, item: u32) -> usize {
         // To the frustum's four sides, which meet in the eye: what is left is in front.
         let low = self.low;
-        let inside = polygon
-            .clip(|p| p.z - p.x)
-            .clip(|p| p.z + p.x)
-            .clip(|p| p.z - p.y)
-            .clip(|p| p.y - low * p.z);
+        let heights = |p: DVec3| [p.z - p.x, p.z + p.x, p.z - p.y, p.y - low * p.z];
+        // Most polygons are outside of one of them altogether, or inside of all.
+        let (mut highest, mut lowest) = ([0.0f64; 4], 0.0f64);
+        for p in polygon.iter() {
+            for (high, h) in highest.iter_mut().zip(heights(*p)) {
+                *high = high.max(h);
+                lowest = lowest.min(h);
+            }
+        }
+        if highest.contains(&0.0) {
+            return 0;
+        }
+        let inside = match lowest < 0.0 {
+            true => (0..4).fold(*polygon, |part, side| part.clip(|p| heights(p)[side])),
+            false => *polygon,
+        };
         if inside.len() < 3 || inside.iter().any(|p| p.z <= 0.0) {
             return 0;
         }

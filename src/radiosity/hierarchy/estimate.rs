@@ -156,7 +156,7 @@ fn visibility(scene: &Scene, hit: &Hit, ends: &[Hit; 4], first: usize, rays: usi
 
 fn blocked(scene: &Scene, from: &Hit, to: &Endpoint) -> bool {
     let ray = from.spawn_to(to);
-    !(ray.t_max > 0.0) || scene.transmittance(&ray, PASSES) < 0.5
+    ray.t_max <= 0.0 || scene.transmittance(&ray, PASSES) < 0.5
 }
 
 /// Surfaces that a ray may pass through.
@@ -184,7 +184,12 @@ fn between_clusters(scene: &Scene, tree: &Tree, r: u32, s: u32) -> Option<Estima
         }
     }
     if free == 0.0 {
-        return None;
+        // What so many pairs did not find is little.
+        return Some(Estimate {
+            form_factor: 0.0,
+            spread: 1.0 / CLUSTER_TRIES as f64,
+            visible: 1.0,
+        });
     }
     let visible: f64 = arrived / free;
     let distance = receiver.center.distance(sender.center);

@@ -90,10 +90,10 @@ impl Sphere {
 }
 
 /// New values of one node.
-struct Update {
-    node: u32,
-    radiosity: Rgb64,
-    irradiance: Rgb64,
+pub struct Update {
+    pub node: u32,
+    pub radiosity: Rgb64,
+    pub irradiance: Rgb64,
 }
 
 impl Field {
@@ -108,6 +108,18 @@ impl Field {
         for (b, node) in field.radiosity.iter_mut().zip(&tree.nodes) {
             *b += node.albedo * node.external;
         }
+        field.pull(tree);
+        field
+    }
+
+    /// The same radiosity everywhere, 1 W/m².
+    pub fn uniform(tree: &Tree) -> Field {
+        let mut field = Field {
+            radiosity: vec![Rgb64::ONE; tree.nodes.len()],
+            irradiance: vec![Rgb64::ZERO; tree.nodes.len()],
+            usual: Vec::new(),
+            intensity: Vec::new(),
+        };
         field.pull(tree);
         field
     }
@@ -145,7 +157,7 @@ impl Field {
     /// What is darker than `black`, as a share of the mean, counts as that dark.
     pub fn judge_by(&mut self, tree: &Tree, black: f64) {
         let mean = self.irradiance[0].max_element();
-        if !(mean > 0.0) {
+        if mean.is_nan() || mean <= 0.0 {
             self.usual = vec![self.radiosity[0].max_element(); tree.nodes.len()];
             return;
         }
@@ -190,7 +202,8 @@ impl Field {
         irradiance
     }
 
-    fn gathered(&self, tree: &Tree) -> Vec<Vec<Update>> {
+    /// What each node below clusters would send and receive next.
+    pub fn gathered(&self, tree: &Tree) -> Vec<Vec<Update>> {
         /// Cells that one task gathers for.
         const CHUNK: usize = 256;
         let around = self.around_clusters(tree);
@@ -294,7 +307,7 @@ impl Field {
         let children = tree.children(node);
         let (radiosity, irradiance) = match children.is_empty() {
             true => {
-                let irradiance = gathered + n.external;
+                let irradiance = gathered * n.scale + n.external;
                 (n.emission + n.albedo * irradiance, irradiance)
             }
             false => {

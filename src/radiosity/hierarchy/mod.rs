@@ -9,6 +9,7 @@
 //! sender, times the form factor. Otherwise one of its ends is divided. The threshold falls in steps from a loose
 //! one to the one that is asked for, with solutions between, so that links are judged by the light that there is.
 
+mod balance;
 mod cluster;
 mod estimate;
 mod gather;
@@ -60,6 +61,8 @@ const STEP: f64 = 4.0;
 const LOOSER: i32 = 4;
 /// Gathering steps before each refinement but the first, at most.
 const LOOKS: u64 = 5;
+/// Scaling of form factors that is worth a warning, in the mean.
+const MUCH: f64 = 0.05;
 /// Irradiance that is no more than this share of the mean is not resolved better than that.
 const BLACK: f64 = 1e-3;
 /// Gathering steps after the last refinement, at most, when no other limit is given.
@@ -82,13 +85,18 @@ pub fn solve(
     let emitted = tree.emitted_power();
     let mut field = Field::new(&tree);
     let most = spec.max_steps.unwrap_or(MAX_STEPS);
-    let mut stopped = false;
+    let mut balanced = balance::Balanced::default();
     for looser in (0..=LOOSER).rev() {
         let clock = Instant::now();
         let error = spec.error * STEP.powi(looser);
         // What few links make dark may be brighter than it seems.
         let black = (BLACK * STEP.powi(looser)).min(0.25);
         refiner.refine(&mut tree, &mut field, error, black);
+        let closed = balance::closed(scene, &tree, &field, spec.seed);
+        if closed == Some(1.0) && balance::absorbs_nothing(&tree) {
+            return Err(SolveError::NoAbsorption);
+        }
+        balanced = balance::balance(&mut tree, closed);
         report.form_factor_seconds += clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         // Before the last refinement, it is enough to see where light goes.
@@ -110,12 +118,18 @@ pub fn solve(
             break;
         }
         if observes(&tree, &field, &report, observe).is_break() {
-            stopped = true;
             break;
         }
     }
     report.links = tree.links();
-    let _ = stopped;
+    if balanced.mean > MUCH {
+        let to = if balanced.closed { "to" } else { "down to" };
+        report.warnings.push(format!(
+            "the form factors of patches were scaled {to} a sum of 1, by {:.0} % in the mean: surfaces that coincide or \
+             let light through, or links that are too coarse",
+            100.0 * balanced.mean
+        ));
+    }
     let solution = output::solution(scene, &tree, &field, report);
     if solution.mesh.is_empty() {
         return Err(SolveError::NoPatches);

@@ -114,7 +114,7 @@ pub fn solution(scene: &Scene, tree: &Tree, field: &Field, report: Report) -> So
         external: found.external,
         absorbed: found.absorbed,
         other: found.other,
-        warnings: [found.warnings, tree.left_out.clone()].concat(),
+        warnings: [found.warnings, report.warnings, tree.left_out.clone()].concat(),
         ..report
     };
     solution

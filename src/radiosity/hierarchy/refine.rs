@@ -14,6 +14,9 @@ const MIN_SIZE: f64 = 1.0 / 256.0;
 /// Connections to lights that are no patches, per node.
 const CONNECTIONS: u32 = 64;
 
+/// Memory ends where a wish for accuracy does not: beyond so many links, no pair is divided any more.
+const MOST_LINKS: usize = 20_000_000;
+
 pub struct Refiner<'a> {
     scene: &'a Scene,
     others: Others<'a>,
@@ -21,6 +24,8 @@ pub struct Refiner<'a> {
     min_size: f64,
     /// Pairs of receiver and sender that no light goes between yet.
     dormant: Vec<(u32, u32)>,
+    /// Links that there are, and pairs that may become some.
+    links: usize,
     /// Links that are less good than asked for, since nothing could be divided any more.
     pub coarse: u64,
 }
@@ -53,6 +58,7 @@ impl<'a> Refiner<'a> {
             seed: spec.seed,
             min_size: spec.min_size.unwrap_or(size * MIN_SIZE),
             dormant: vec![(0, 0)],
+            links: 0,
             coarse: 0,
         };
         let cells = tree.cells.clone();
@@ -127,6 +133,7 @@ impl<'a> Refiner<'a> {
         let mut pairs = std::mem::take(&mut self.dormant);
         pairs.extend(self.reconsidered(tree, field, threshold));
         while !pairs.is_empty() {
+            self.links = tree.links() + pairs.len();
             let judge = |&(r, s): &(u32, u32)| self.judge(tree, field, r, s, threshold);
             let fates: Vec<Fate> = pairs.par_iter().map(judge).collect();
             let mut next = Vec::new();
@@ -211,6 +218,9 @@ impl<'a> Refiner<'a> {
 
     /// Whether one of both can be divided: that which is wanted, or else the other where that is a cluster.
     fn divisible(&self, tree: &Tree, r: u32, s: u32, by_sender: bool) -> bool {
+        if self.links > MOST_LINKS && r != s {
+            return false;
+        }
         let can = |node: u32| self.can_be_divided(tree, node);
         let (wanted, other) = if by_sender { (s, r) } else { (r, s) };
         can(wanted) || (tree.nodes[other as usize].is_cluster())

@@ -37,6 +37,8 @@ pub struct TreeNode {
     pub emission: Rgb64,
     /// Irradiance from lights that are no patches, in W/m².
     pub external: Rgb64,
+    /// Of what links bring to a patch (see `balance`).
+    pub scale: f64,
     pub links: Vec<TreeLink>,
 }
 
@@ -214,6 +216,7 @@ impl TreeNode {
             albedo,
             emission,
             external: Rgb64::ZERO,
+            scale: 1.0,
             links: Vec::new(),
         }
     }

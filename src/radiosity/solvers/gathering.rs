@@ -125,6 +125,7 @@ pub(super) fn gather(
         converged: residual <= wanted,
         row_sum: sums.fold(0.0, f64::max),
         escaped: given,
+        quality: None,
         form_factor_seconds: 0.0,
     }
 }

@@ -16,7 +16,7 @@ mod watch;
 mod tests;
 
 use super::discontinuity::{self, Limits};
-use super::form_factors::{FormFactors, Matrix};
+use super::form_factors::{FormFactors, Matrix, Quality};
 use super::report::{self, Balance};
 use super::{
     PatchMesh, Progress, Report, Rgb64, Solution, SolveError, SolveSpec, Solver, Surfaces, lights,
@@ -34,13 +34,16 @@ const PATCHES_OF_SHOOTING: u64 = 10_000;
 /// A row that sums to more than 1 by this is worth a warning.
 const ROW_SUM_DOUBT: f64 = 0.1;
 
+/// In the report, rows of a closed scene that miss 1 by more than this count as off.
+const ROW_TOLERANCE: f64 = 0.01;
+
 /// Form factors between patches, as the solvers ask for them. Each is a pure function of its numbers.
 pub(super) trait Exchange: Sync {
     /// F_ij for all j: the share of what leaves i that arrives at j.
     fn row(&self, i: u32, out: &mut [f64]);
 
-    /// All rows.
-    fn matrix(&self) -> Matrix;
+    /// All rows; and how well they keep what holds of form factors, if that is known.
+    fn matrix(&self) -> (Matrix, Option<Quality>);
 }
 
 impl Exchange for FormFactors<'_> {
@@ -48,8 +51,10 @@ impl Exchange for FormFactors<'_> {
         FormFactors::row(self, i, out);
     }
 
-    fn matrix(&self) -> Matrix {
-        FormFactors::matrix(self)
+    fn matrix(&self) -> (Matrix, Option<Quality>) {
+        let (matrix, losses) = self.matrix_and_losses();
+        let quality = Quality::new(self, &matrix, &losses, ROW_TOLERANCE);
+        (matrix, Some(quality))
     }
 }
 
@@ -76,6 +81,8 @@ pub(super) struct Solved {
     pub row_sum: f64,
     /// W that leave patches and arrive at none.
     pub escaped: Rgb64,
+    /// Of the form factors, where all of them were known at once.
+    pub quality: Option<Quality>,
     pub form_factor_seconds: f64,
 }
 
@@ -169,6 +176,7 @@ pub(super) fn solve(
         mesh_seconds,
         form_factor_seconds: solved.form_factor_seconds,
         solve_seconds: seconds,
+        quality: solved.quality,
         ..report::of(scene, &balance)
     };
     report.warnings.extend(said);
@@ -241,13 +249,14 @@ fn by_factors(
         return shooting::shoot(system, factors, spec.ambient, run);
     }
     let start = Instant::now();
-    let matrix = factors.matrix();
+    let (matrix, quality) = factors.matrix();
     let form_factor_seconds = start.elapsed().as_secs_f64();
     let solved = match spec.solver {
         Solver::Gauss => direct::eliminate(system, &matrix, run)?,
         solver => gathering::iterate(system, &matrix, solver, run)?,
     };
     Ok(Solved {
+        quality,
         form_factor_seconds,
         ..solved
     })

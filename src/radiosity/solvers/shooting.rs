@@ -73,6 +73,7 @@ pub(super) fn shoot(
         converged: residual <= run.residual,
         row_sum: state.row_sum,
         escaped: state.escaped,
+        quality: None,
         form_factor_seconds: seconds,
     })
 }

@@ -13,8 +13,8 @@ impl Exchange for Given {
         out.copy_from_slice(self.0.row(i as usize));
     }
 
-    fn matrix(&self) -> Matrix {
-        self.0.clone()
+    fn matrix(&self) -> (Matrix, Option<Quality>) {
+        (self.0.clone(), None)
     }
 }
 

@@ -13,8 +13,9 @@
 //! | L … D D (S\|G)* D (S\|G)* E, at y | the cache, which has those that diffuse surfaces alone bring |
 //! | L S+ D (S\|G)* D (S\|G)* E, at y | photons around y, if these are shot |
 //!
-//! So each path is found once at most. What is lost, and makes the bias together with the patches' size, is light at
-//! y that last came by S or G, but for caustics by photons. Where y lies nearer to x than its patch is large, the
+//! So each path is found once at most. What makes the bias, together with the patches' size, is light at y that came
+//! by S or G behind it: what opaque surfaces reflect so is solved for as if it were reflected diffusely (see
+//! [`SolveSpec::gloss_as_diffuse`](crate::radiosity::SolveSpec)), or lost where photons bring caustics. Where y lies nearer to x than its patch is large, the
 //! patch's mean would show in corners: the walk goes on from y as if it had no patch, and the same holds for
 //! surfaces without patches.
 

@@ -212,11 +212,11 @@ fn lost(scene: &Scene) -> &'static str {
     ) {
         (false, false) => "",
         (true, false) => {
-            "; what mirrors, glass and gloss send to diffuse surfaces is left out of it"
+            "; what mirrors, glass and gloss send to diffuse surfaces is found only roughly, or lost"
         }
         (false, true) => "; light by way of moving surfaces is left out of it",
         (true, true) => {
-            "; what mirrors, glass, gloss and moving surfaces send to diffuse surfaces is left out of it"
+            "; what mirrors, glass, gloss and moving surfaces send to diffuse surfaces is found only roughly, or lost"
         }
     }
 }

@@ -132,6 +132,8 @@ pub struct Solving<'a> {
     spec: &'a SolveSpec,
     given: Option<&'a Solved>,
     made_for: Use,
+    /// Whether light by mirrors and gloss is left out of the solution, since others find it.
+    without_gloss: bool,
     made: OnceLock<Result<Option<Cache>, SolveError>>,
 }
 
@@ -144,6 +146,7 @@ impl<'a> Solving<'a> {
     ) -> Solving<'a> {
         Solving {
             made_for,
+            without_gloss: false,
             scene,
             spec,
             given,
@@ -158,6 +161,14 @@ impl<'a> Solving<'a> {
             Indirect::None | Indirect::Gather => Use::Smooth,
         };
         Solving::new(scene, &cache.solve, cache.given.as_ref(), made_for)
+    }
+
+    /// The same without light by mirrors and gloss where it is read: what photons bring must not be read too.
+    pub fn beside_photons(self) -> Solving<'a> {
+        Solving {
+            without_gloss: self.made_for != Use::Guide,
+            ..self
+        }
     }
 
     /// Solves, on all threads of the current pool, unless that is done. `observe` sees every step and may stop the
@@ -179,7 +190,7 @@ impl<'a> Solving<'a> {
     ) -> Result<Option<Cache>, SolveError> {
         let solution = match self.given {
             Some(Solved(solution)) => Arc::clone(solution),
-            None => match radiosity::solve(self.scene, self.spec, observe) {
+            None => match radiosity::solve(self.scene, &self.to_solve(), observe) {
                 Ok(solution) => Arc::new(solution),
                 // Nothing to read: walks find all light by themselves.
                 Err(SolveError::NoPatches) => return Ok(None),
@@ -189,6 +200,14 @@ impl<'a> Solving<'a> {
         let cache = Cache::new(solution, self.scene, self.made_for);
         // Without links, nothing to be guided by.
         Ok((self.made_for != Use::Guide || cache.guide.is_some()).then_some(cache))
+    }
+
+    fn to_solve(&self) -> SolveSpec {
+        let spec = self.spec.clone();
+        SolveSpec {
+            gloss_as_diffuse: spec.gloss_as_diffuse && !self.without_gloss,
+            ..spec
+        }
     }
 
     /// The solution, once [`Solving::prepare`] has made it; `None` where there is nothing to read.
