@@ -154,7 +154,7 @@ pub fn overridden(
             Err(error(no_links(cache.solve.solver)).with_help(INSTEAD))
         }
         // Nothing was asked of the solution.
-        Some(cache) if cache.solve == SolveSpec::default() => {
+        Some(cache) if cache.solve == CacheSpec::default().solve => {
             Ok(spec.with_cache(CacheSpec::of(indirect)))
         }
         Some(cache) => Ok(spec.with_cache(CacheSpec { indirect, ..cache })),
