@@ -1,0 +1,126 @@
+//! Walks that radiosity guides: the means of pictures are those of plain path tracing, on all that could part them,
+//! and the same for any number of threads.
+
+#[path = "common/render.rs"]
+mod render;
+
+use luxel::format::{Compiled, Overrides};
+use luxel::transport::{CacheSpec, CachedSpec, Indirect, IntegratorSpec, PathSpec};
+use render::{camera, compile_with, mean_of, scene};
+
+/// A room, open to the camera, with a block that throws a shadow.
+fn room(content: &str) -> String {
+    let wall = |place: &str, rgb: &str| {
+        format!(
+            r#"<shape type="rectangle"><transform name="to_world"><scale value="2"/>{place}</transform>
+            <bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="{rgb}"/></bsdf></bsdf></shape>"#
+        )
+    };
+    let content = format!(
+        r#"{}{}{}{}
+        <shape type="cube"><transform name="to_world"><scale value="0.5"/><rotate y="1" angle="20"/>
+            <translate x="0.7" y="-1.5" z="-0.4"/></transform>
+            <bsdf type="diffuse"><rgb name="reflectance" value="0.7"/></bsdf></shape>
+        {content}"#,
+        wall(
+            r#"<rotate x="1" angle="-90"/><translate y="-2"/>"#,
+            "0.7, 0.7, 0.7"
+        ),
+        wall(r#"<translate z="-2"/>"#, "0.7, 0.7, 0.7"),
+        wall(
+            r#"<rotate y="1" angle="90"/><translate x="-2"/>"#,
+            "0.6, 0.1, 0.1"
+        ),
+        wall(
+            r#"<rotate y="1" angle="-90"/><translate x="2"/>"#,
+            "0.8, 0.5, 0.1"
+        ),
+    );
+    scene(-1, &camera(16, 55.0), &content)
+}
+
+/// Shines upwards: all that the camera sees but the lamp's side is lit by other surfaces. It reflects too.
+const LAMP: &str = r#"<shape type="rectangle"><transform name="to_world">
+    <scale value="0.4"/><rotate x="1" angle="-90"/><translate x="-0.6" y="-0.5"/></transform>
+    <bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="0.5"/></bsdf></bsdf>
+    <emitter type="area"><rgb name="radiance" value="20"/></emitter></shape>
+    <shape type="rectangle"><transform name="to_world"><scale value="2"/>
+    <rotate x="1" angle="90"/><translate y="2"/></transform>
+    <bsdf type="diffuse"><rgb name="reflectance" value="0.7"/></bsdf></shape>"#;
+
+fn compiled(xml: &str, indirect: Indirect, seed: u64) -> Compiled {
+    let overrides = Overrides {
+        seed: Some(seed),
+        ..Overrides::default()
+    };
+    let mut compiled = compile_with(xml, &overrides);
+    let path = PathSpec::default();
+    compiled.job.integrator = match indirect {
+        Indirect::None => IntegratorSpec::Path(path),
+        other => IntegratorSpec::Cached(CachedSpec {
+            path,
+            cache: CacheSpec::of(other),
+        }),
+    };
+    compiled
+}
+
+fn mean_and_error(xml: &str, indirect: Indirect, seed: u64, spp: u64) -> (f64, f64) {
+    let compiled = compiled(xml, indirect, seed);
+    let (film, stats) = render::render(&compiled, spp);
+    let solved = stats.solution.is_some();
+    assert_eq!(solved, indirect != Indirect::None, "nothing was solved");
+    let variances = film.standard_error().into_iter().map(|s| s[0] * s[0]);
+    let picture = film.mean();
+    let stderr = variances.sum::<f64>().sqrt() / picture.len() as f64;
+    (mean_of(&picture), stderr)
+}
+
+/// Means may differ by 4.5 standard errors (once in 150,000), which are small enough that 1 % shows.
+fn agrees(content: &str, spp: u64) {
+    let xml = room(content);
+    let (a, da) = mean_and_error(&xml, Indirect::None, 1, spp);
+    let (b, db) = mean_and_error(&xml, Indirect::Guide, 2, spp);
+    let noise = da.hypot(db);
+    assert!(noise < 2.2e-3 * a, "{noise} says too little of {a}");
+    assert!((a - b).abs() < 4.5 * noise, "{a} {b} +- {noise}");
+}
+
+#[test]
+fn diffuse_rooms_keep_their_mean() {
+    agrees(LAMP, 2048);
+}
+
+#[test]
+fn curved_and_glossy_bodies_keep_it() {
+    let bodies = r#"<shape type="sphere"><point name="center" x="-0.9" y="-1.4" z="-0.5"/><float name="radius" value="0.5"/>
+        <bsdf type="diffuse"><rgb name="reflectance" value="0.8"/></bsdf></shape>
+        <shape type="cylinder"><point name="p0" x="1.5" y="-2" z="-1.4"/><point name="p1" x="1.5" y="1" z="-1.4"/>
+        <float name="radius" value="0.3"/><bsdf type="twosided"><bsdf type="roughconductor">
+        <float name="alpha" value="0.3"/></bsdf></bsdf></shape>"#;
+    agrees(&format!("{LAMP}{bodies}"), 2048);
+}
+
+#[test]
+fn a_window_and_a_mask_keep_it() {
+    let bodies = r#"<emitter type="constant"><rgb name="radiance" value="1"/></emitter>
+        <shape type="rectangle"><transform name="to_world"><rotate x="1" angle="-90"/><translate y="0.5"/></transform>
+        <bsdf type="mask"><float name="opacity" value="0.5"/><bsdf type="twosided">
+        <bsdf type="diffuse"><rgb name="reflectance" value="0.8"/></bsdf></bsdf></bsdf></shape>"#;
+    agrees(bodies, 1024);
+}
+
+#[test]
+fn threads_make_no_difference() {
+    let xml = room(LAMP);
+    let by = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let work = || {
+            render::render(&compiled(&xml, Indirect::Guide, 3), 4)
+                .0
+                .mean()
+        };
+        pool.unwrap().install(work)
+    };
+    assert_eq!(by(1), by(4));
+}
