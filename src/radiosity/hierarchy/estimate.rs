@@ -185,11 +185,7 @@ fn between_clusters(scene: &Scene, tree: &Tree, r: u32, s: u32) -> Option<Estima
     }
     if free == 0.0 {
         // What so many pairs did not find is little.
-        return Some(Estimate {
-            form_factor: 0.0,
-            spread: 1.0 / CLUSTER_TRIES as f64,
-            visible: 1.0,
-        });
+        return None;
     }
     let visible: f64 = arrived / free;
     let distance = receiver.center.distance(sender.center);
