@@ -434,7 +434,7 @@ fn no_light_leaks_under_a_table_with_any_solver() {
 
 /// Draws what `LUXEL_MESH` names to `LUXEL_MESH_OUT`: each cut facet as a picture, lines thick.
 #[test]
-#[ignore]
+#[ignore = "draws pictures; it checks nothing"]
 fn draw() {
     let (Ok(path), Ok(out)) = (std::env::var("LUXEL_MESH"), std::env::var("LUXEL_MESH_OUT")) else {
         return;

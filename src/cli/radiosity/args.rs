@@ -40,7 +40,7 @@ pub struct RadiosityArgs {
     /// Shortest edge of a patch that the solver hierarchical makes, in scene units
     #[arg(long, value_name = "X", value_parser = parse_positive)]
     pub min_size: Option<f64>,
-    /// Greatest error of a link of the solver hierarchical, as a share of the emitted power
+    /// Greatest error of a link of the solver hierarchical, as a share of the light that is usual at its receiver, times the receiver's share of all area
     /// [default: what the scene's integrator says, else 1e-5]
     #[arg(long, value_name = "X", value_parser = parse_positive)]
     pub error: Option<f64>,

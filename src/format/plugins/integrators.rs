@@ -130,7 +130,7 @@ const MIN_SIZE: Param = Param::optional(
 const ERROR: Param = Param::optional(
     "error",
     Kind::Float(Range::Positive),
-    "Greatest error of a link of the solver hierarchical, as a share of the power that the scene emits; without it, 1e-5, or 1e-3 behind indirect=gather and 1e-4 behind indirect=guide.",
+    "Greatest error of a link of the solver hierarchical, as a share of the light that is usual at its receiver, times the receiver's share of all area; without it, 1e-5, or 1e-3 behind indirect=gather and 1e-4 behind indirect=guide.",
 );
 const RESIDUAL: Param = Param::float(
     "residual",

@@ -153,7 +153,7 @@ fn observes(
     observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> ControlFlow<()> {
     let (mesh, numbers) = output::mesh(tree);
-    let radiosity = output::by_patch(tree, &numbers, &field.radiosity);
+    let radiosity = output::by_patch(&numbers, &field.radiosity);
     observe(&Progress {
         step: report.steps,
         mesh: &mesh,

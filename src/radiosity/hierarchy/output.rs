@@ -81,7 +81,7 @@ pub fn mesh(tree: &Tree) -> (PatchMesh, Numbers) {
 }
 
 /// Values of nodes, by patch.
-pub fn by_patch(_tree: &Tree, numbers: &Numbers, values: &[Rgb64]) -> Vec<Rgb64> {
+pub fn by_patch(numbers: &Numbers, values: &[Rgb64]) -> Vec<Rgb64> {
     numbers.leaf.iter().map(|&n| values[n as usize]).collect()
 }
 
@@ -90,10 +90,10 @@ pub fn solution(scene: &Scene, tree: &Tree, field: &Field, report: Report) -> So
     let (mesh, numbers) = mesh(tree);
     let direct = Field::of_emission(tree).arriving(tree);
     let mut solution = Solution {
-        radiosity: by_patch(tree, &numbers, &field.radiosity),
-        irradiance: by_patch(tree, &numbers, &field.irradiance),
-        direct: by_patch(tree, &numbers, &direct),
-        hierarchy: Some(hierarchy(tree, field, &numbers)),
+        radiosity: by_patch(&numbers, &field.radiosity),
+        irradiance: by_patch(&numbers, &field.irradiance),
+        direct: by_patch(&numbers, &direct),
+        hierarchy: Some(hierarchy(tree, &numbers)),
         mesh,
         report: Report::default(),
     };
@@ -120,7 +120,7 @@ pub fn solution(scene: &Scene, tree: &Tree, field: &Field, report: Report) -> So
     solution
 }
 
-fn hierarchy(tree: &Tree, field: &Field, numbers: &Numbers) -> Hierarchy {
+fn hierarchy(tree: &Tree, numbers: &Numbers) -> Hierarchy {
     let mut out = Hierarchy {
         nodes: Vec::with_capacity(tree.nodes.len()),
         links: Vec::with_capacity(tree.links()),
@@ -146,6 +146,5 @@ fn hierarchy(tree: &Tree, field: &Field, numbers: &Numbers) -> Hierarchy {
             links: first..out.links.len() as u32,
         });
     }
-    let _ = field;
     out
 }

@@ -26,8 +26,6 @@ pub struct Refiner<'a> {
     dormant: Vec<(u32, u32)>,
     /// Links that there are, and pairs that may become some.
     links: usize,
-    /// Links that are less good than asked for, since nothing could be divided any more.
-    pub coarse: u64,
 }
 
 /// What becomes of a pair.
@@ -59,7 +57,6 @@ impl<'a> Refiner<'a> {
             min_size: spec.min_size.unwrap_or(size * MIN_SIZE),
             dormant: vec![(0, 0)],
             links: 0,
-            coarse: 0,
         };
         let cells = tree.cells.clone();
         refiner.light(tree, &cells);
@@ -127,7 +124,6 @@ impl<'a> Refiner<'a> {
     /// Links all pairs of nodes so that no link errs by more than `threshold` (see [`errors`]), judged by the light
     /// of `field`; what is darker than `black`, as a share of the mean, is no better than that.
     pub fn refine(&mut self, tree: &mut Tree, field: &mut Field, threshold: f64, black: f64) {
-        self.coarse = 0;
         field.judge_by(tree, black);
         self.refine_external(tree, field, threshold);
         let mut pairs = std::mem::take(&mut self.dormant);
@@ -259,7 +255,6 @@ impl<'a> Refiner<'a> {
         let node = if by_sender { s } else { r };
         if !tree.divide(self.scene, node, self.min_size) {
             // Patches ran out while the pairs were looked at.
-            self.coarse += 1;
             if let Some(found) = estimate(self.scene, tree, r, s, true) {
                 tree.nodes[r as usize].links.push(TreeLink {
                     sender: s,
