@@ -1,63 +1,67 @@
 //! Where diffuse light comes from: a distribution over the patches that light each patch.
 //!
-//! The links of a patch and of its ancestors partition all senders of its light. With probability proportional to
+//! The links of a patch and of its ancestors partition all senders of its light: with probability proportional to
 //! the irradiance that it brings, a link is chosen; below its sender a patch, by its power; on that a point, uniform
 //! over its area. What emitters send is left out, since they are sampled by themselves, so nothing is aimed at their
 //! surfaces.
+//!
+//! Links err: one that a few rays found blocked is not there, though some points of its ends see each other, and what
+//! comes that way is then very noisy. So patches that lie together share one distribution, the mean of theirs, and a
+//! part of it is the mean over a wider neighbourhood, a part of that over a wider one still ([`REGIONS`]). As ranges
+//! of patches such a mean is one short table, in which sampling and density are one search each.
 //!
 //! The technique is "a point of patch q, seen from p": a direction counts only if what a ray meets first lies on the
 //! very patch that was aimed at. A direction that meets q then has one density, whoever found it. Patches are flat,
 //! while what they stand for may be curved: a direction that meets the surface of q, but passes beside its flat
 //! piece, is never aimed at, and has density 0.
 
+mod spread;
+
 use super::{Outline, Patch, Piece, Rgb64, Solution};
 use crate::geom::Hit;
 use crate::math::{DVec2, DVec3, Vec3};
 use crate::scene::Scene;
 use rayon::prelude::*;
+use spread::{Prefix, Senders, Step, positive};
 use std::f64::consts::PI;
+use std::ops::Range;
 use std::sync::Arc;
 
-/// The distribution, made of a hierarchical solution.
+/// The distributions, made of a hierarchical solution.
 #[derive(Debug)]
 pub struct Guide {
     solution: Arc<Solution>,
-    nodes: Vec<Node>,
-    senders: Vec<Sender>,
-    /// Power in W, as luminance and without emitters, of all patches before each; one more than there are patches.
-    power: Vec<f64>,
+    /// By patch: which of `tables` its light is found by; [`NONE`] if no link brings any.
+    table_of: Vec<u32>,
+    /// Where each table begins in `firsts` and `before`, and the end of the last.
+    tables: Vec<u32>,
+    /// First patch of each step, the last of a table being the end of the one before.
+    firsts: Vec<u32>,
+    /// Probability of the steps before in the table.
+    before: Vec<f64>,
+    /// Probability per power, in 1/W.
+    density: Vec<f64>,
+    /// Power in W, as luminance and without emitters, of the patches.
+    power: Prefix,
     /// By patch.
-    flats: Vec<Flat>,
+    glow: Vec<Glow>,
 }
 
+/// What a patch sends without what it emits.
 #[derive(Clone, Copy, Debug)]
-struct Node {
-    /// The nearest ancestor with senders; `u32::MAX` if there is none.
-    above: u32,
-    /// Into `Guide::senders`.
-    first: u32,
-    end: u32,
-    /// Irradiance in W/m² that comes by links of this node, and of all above with it.
-    own: f64,
-    total: f64,
-}
-
-/// A link that brings light.
-#[derive(Clone, Copy, Debug)]
-struct Sender {
-    /// Its patches.
-    first: u32,
-    end: u32,
-    /// Irradiance in W/m² by the links before it of the same node.
-    before: f64,
-    /// By this link per power of the sender, in 1/m².
-    per_power: f64,
+struct Glow {
+    /// What it is aimed at for, in W/m² as luminance; 0 on emitters.
+    exitance: f64,
+    /// In W/(m² sr), as luminance.
+    radiance: f32,
+    /// Whether what it stands for is curved.
+    curved: bool,
 }
 
 /// A patch that light comes to.
 #[derive(Clone, Copy, Debug)]
 pub struct Receiver {
-    node: u32,
+    table: u32,
 }
 
 /// A point that was aimed at.
@@ -71,75 +75,88 @@ pub struct Aim {
 
 const NONE: u32 = u32::MAX;
 
+/// Share of the area of all surfaces that has one distribution at most, then that takes part in what is mixed into it,
+/// and into that.
+const REGIONS: [f64; 3] = [1.0 / 2048.0, 1.0 / 256.0, 1.0 / 32.0];
+/// Share of what is mixed in.
+const WIDER: f64 = 0.15;
+/// Neighbouring steps of a table are joined if they are less probable than this together.
+const STEP: f64 = 1.0 / 512.0;
+
 impl Guide {
     /// What the links of `solution` know of the light in `scene`; `None` if it has no links.
     pub fn new(scene: &Scene, solution: Arc<Solution>) -> Option<Guide> {
         let hierarchy = solution.hierarchy.as_ref()?;
         let patches = &solution.mesh.patches;
         let facets = solution.mesh.surfaces.facets();
-        let (mut power, mut area) = (vec![0.0], vec![0.0]);
-        let (mut power_so_far, mut area_so_far) = (0.0, 0.0);
-        for (patch, &b) in patches.iter().zip(&solution.radiosity) {
-            if !scene.is_emitter(facets[patch.facet as usize].shape) {
-                power_so_far += positive(luminance(b - patch.emission) * patch.area);
-            }
-            area_so_far += patch.area;
-            power.push(power_so_far);
-            area.push(area_so_far);
-        }
-        let below = |sums: &[f64], first: u32, end: u32| sums[end as usize] - sums[first as usize];
-        let mut senders = Vec::with_capacity(hierarchy.links.len());
-        let mut nodes: Vec<Node> = Vec::with_capacity(hierarchy.nodes.len());
-        for node in &hierarchy.nodes {
-            let first = senders.len() as u32;
-            let mut own = 0.0;
-            for link in &hierarchy.links[node.links.start as usize..node.links.end as usize] {
-                let from = &hierarchy.nodes[link.sender as usize].patches;
-                let per_power = f64::from(link.form_factor) / below(&area, from.start, from.end);
-                let brought = positive(per_power * below(&power, from.start, from.end));
-                if brought > 0.0 {
-                    senders.push(Sender {
-                        first: from.start,
-                        end: from.end,
-                        before: own,
-                        per_power,
-                    });
-                    own += brought;
-                }
-            }
-            // Parents have smaller numbers.
-            let parent = nodes.get(node.parent as usize).copied();
-            nodes.push(Node {
-                above: match parent {
-                    Some(parent) if parent.own > 0.0 => node.parent,
-                    Some(parent) => parent.above,
-                    None => NONE,
+        let glow = |(patch, &b): (&Patch, &Rgb64)| {
+            let facet = &facets[patch.facet as usize];
+            let reflected = luminance(b - patch.emission);
+            Glow {
+                exitance: match scene.is_emitter(facet.shape) {
+                    true => 0.0,
+                    false => positive(reflected),
                 },
-                first,
-                end: senders.len() as u32,
-                own,
-                total: own + parent.map_or(0.0, |p| p.total),
-            });
-        }
-        let flat = |(i, patch): (usize, &Patch)| {
-            Flat::new(&patch.piece, below(&power, i as u32, i as u32 + 1))
+                radiance: (reflected / PI) as f32,
+                curved: facet.is_curved(),
+            }
         };
-        let flats = patches.par_iter().enumerate().map(flat).collect();
-        Some(Guide {
-            nodes,
-            senders,
+        let glow: Vec<Glow> = patches.iter().zip(&solution.radiosity).map(glow).collect();
+        let sent = |(glow, patch): (&Glow, &Patch)| positive(glow.exitance * patch.area);
+        let power = Prefix::new(glow.iter().zip(patches).map(sent));
+        let area = Prefix::new(patches.iter().map(|patch| patch.area));
+        let senders = Senders::new(hierarchy, &area, &power);
+        let regions = mixed(&senders, &area, &power);
+        let mut guide = Guide {
+            table_of: vec![NONE; patches.len()],
+            tables: vec![0],
+            firsts: Vec::new(),
+            before: Vec::new(),
+            density: Vec::new(),
             power,
-            flats,
+            glow,
             solution,
-        })
+        };
+        for (range, steps) in regions {
+            if !steps.is_empty() {
+                let table = guide.tables.len() as u32 - 1;
+                guide.table_of[range.start as usize..range.end as usize].fill(table);
+                guide.push(&steps);
+            }
+        }
+        Some(guide)
     }
 
-    /// A patch, if links bring light to it.
+    /// Another table. Gaps between steps become steps of density 0.
+    fn push(&mut self, steps: &[Step]) {
+        let (mut end, mut sum) = (0, 0.0);
+        let mut add = |first: u32, before: f64, density: f64| {
+            self.firsts.push(first);
+            self.before.push(before);
+            self.density.push(density);
+        };
+        for step in steps {
+            if step.first > end {
+                add(end, sum, 0.0);
+            }
+            add(step.first, sum, step.density);
+            sum += step.density * self.power.over(step.first, step.end);
+            end = step.end;
+        }
+        add(end, sum, 0.0);
+        let begin = self.tables[self.tables.len() - 1] as usize;
+        for i in begin..self.before.len() {
+            self.before[i] /= sum;
+            self.density[i] /= sum;
+        }
+        self.tables.push(self.firsts.len() as u32);
+    }
+
+    /// A patch, if links bring light to it or to patches around it.
     #[inline]
     pub fn receiver(&self, patch: u32) -> Option<Receiver> {
-        let node = *self.solution.hierarchy.as_ref()?.leaf.get(patch as usize)?;
-        let total = self.nodes[node as usize].total;
-        (total > 0.0).then_some(Receiver { node })
+        let table = *self.table_of.get(patch as usize)?;
+        (table != NONE).then_some(Receiver { table })
     }
 
     /// The patch at `hit` on the side of `hit.wo`.
@@ -157,8 +174,7 @@ impl Guide {
     /// Radiance in W/(m² sr), as luminance, of a patch without what it emits.
     #[inline]
     pub fn radiance(&self, patch: u32) -> f32 {
-        let emitted = self.solution.mesh.patches[patch as usize].emission;
-        (luminance(self.solution.radiosity[patch as usize] - emitted) / PI) as f32
+        self.glow[patch as usize].radiance
     }
 
     /// A direction from `p` towards a point that sends light to `receiver`; `choice` in [0,1) chooses the patch, `u`
@@ -174,63 +190,85 @@ impl Guide {
         })
     }
 
-    /// Density per steradian with which [`Guide::sample`] aims along `wi` at `patch`.
+    /// Density per steradian with which [`Guide::sample`] aims from `p` along `wi` at the patch at `met`.
     #[inline]
-    pub fn pdf(&self, receiver: Receiver, p: Vec3, wi: Vec3, patch: u32) -> f32 {
-        let per_power = self.per_power(receiver, patch);
-        if per_power == 0.0 {
+    pub fn pdf(&self, receiver: Receiver, p: Vec3, wi: Vec3, met: &Hit, patch: u32) -> f32 {
+        let glow = self.glow[patch as usize];
+        let pdf_a = match glow.exitance > 0.0 {
+            true => glow.exitance * self.per_power(receiver, patch),
+            false => 0.0,
+        };
+        if pdf_a == 0.0 {
             return 0.0;
         }
-        let total = self.nodes[receiver.node as usize].total;
-        let flat = &self.flats[patch as usize];
-        let pdf_a = per_power * (flat.exitance / total);
-        bounded(pdf_a * flat.area_per_sr(p.as_dvec3(), wi.as_dvec3()))
+        let area_per_sr = match glow.curved {
+            true => {
+                let flat = Flat::new(&self.solution.mesh.patches[patch as usize].piece);
+                flat.area_per_sr(p.as_dvec3(), wi.as_dvec3())
+            }
+            // What was met lies on the patch.
+            false => {
+                let d = met.p.as_dvec3() - p.as_dvec3();
+                d.length_squared() / f64::from(met.ng.dot(wi).abs())
+            }
+        };
+        bounded(pdf_a * area_per_sr)
     }
 
-    /// Irradiance that the link by which `patch` sends to `receiver` brings per power of its sender, in 1/m²; 0
-    /// without such a link.
+    /// The steps of the table of `receiver`.
+    #[inline]
+    fn table(&self, receiver: Receiver) -> std::ops::Range<usize> {
+        let table = receiver.table as usize;
+        self.tables[table] as usize..self.tables[table + 1] as usize
+    }
+
+    /// Probability per power of `patch`, in 1/W.
     #[inline]
     fn per_power(&self, receiver: Receiver, patch: u32) -> f64 {
-        let mut number = receiver.node;
-        while let Some(node) = self.nodes.get(number as usize) {
-            let senders = &self.senders[node.first as usize..node.end as usize];
-            // Senders of a node do not overlap.
-            let behind = senders.partition_point(|s| s.first <= patch);
-            if let Some(sender) = behind.checked_sub(1).map(|i| &senders[i])
-                && patch < sender.end
-            {
-                return sender.per_power;
-            }
-            number = node.above;
+        let table = self.table(receiver);
+        let behind = self.firsts[table.clone()].partition_point(|first| *first <= patch);
+        match behind {
+            0 => 0.0,
+            behind => self.density[table.start + behind - 1],
         }
-        0.0
     }
 
     /// The patch that `choice` in [0,1) falls on.
     #[inline]
     fn choose(&self, receiver: Receiver, choice: f64) -> Option<u32> {
-        let mut node = self.nodes.get(receiver.node as usize)?;
-        let mut left = choice * node.total;
-        while left >= node.own {
-            match self.nodes.get(node.above as usize) {
-                Some(above) => {
-                    left -= node.own;
-                    node = above;
-                }
-                // By rounding.
-                None => break,
-            }
-        }
-        let senders = &self.senders[node.first as usize..node.end as usize];
-        let behind = senders.partition_point(|s| s.before <= left);
-        let sender = senders.get(behind.checked_sub(1)?)?;
-        let (first, end) = (sender.first as usize, sender.end as usize);
-        let power = self.power[first] + (left - sender.before) / sender.per_power;
-        // The last patch that has any power, if rounding went beyond.
-        let power = power.min(self.power[end].next_down());
-        let before = self.power[first..=end].partition_point(|sum| *sum <= power);
-        Some((first + before.saturating_sub(1)).min(end - 1) as u32)
+        let table = self.table(receiver);
+        let before = &self.before[table.clone()];
+        let behind = before.partition_point(|sum| *sum <= choice);
+        // The last entry is the end of the table.
+        let step = table.start + behind.min(before.len() - 1).checked_sub(1)?;
+        let (first, end) = (self.firsts[step], self.firsts[step + 1]);
+        let power = (choice - self.before[step]) / self.density[step];
+        Some(self.power.find(first, end, power))
     }
+}
+
+/// The distributions of all regions.
+fn mixed(senders: &Senders, area: &Prefix, power: &Prefix) -> Vec<(Range<u32>, Vec<Step>)> {
+    let mut wider: Vec<(Range<u32>, Vec<Step>)> = Vec::new();
+    let all = area.whole();
+    for most in REGIONS.into_iter().rev() {
+        let ranges = senders.regions(area, most * all);
+        let own = ranges.into_par_iter().map(|range| {
+            let own = spread::joined(&senders.of(&range), power, STEP);
+            // The last region that begins no later.
+            let behind = wider.partition_point(|(wide, _)| wide.start <= range.start);
+            let steps = match behind.checked_sub(1).map(|i| &wider[i].1) {
+                None => own,
+                Some(around) => {
+                    let both = [(&own[..], 1.0 - WIDER), (&around[..], WIDER)];
+                    spread::joined(&spread::sum(both.into_iter()), power, STEP)
+                }
+            };
+            (range, steps)
+        });
+        wider = own.collect();
+    }
+    wider
 }
 
 /// The flat piece of a patch, made ready to be met.
@@ -243,12 +281,10 @@ struct Flat {
     s: DVec3,
     t: DVec3,
     outline: Outline,
-    /// In W/m², as luminance and without emitters.
-    exitance: f64,
 }
 
 impl Flat {
-    fn new(piece: &Piece, power: f64) -> Flat {
+    fn new(piece: &Piece) -> Flat {
         let n = piece.normal();
         // |e1 x e2|, as e1 x e2 is along n.
         let whole = piece.cross().dot(n);
@@ -258,7 +294,6 @@ impl Flat {
             s: piece.e2.cross(n) / whole,
             t: n.cross(piece.e1) / whole,
             outline: piece.outline,
-            exitance: positive(power / piece.area()),
         }
     }
 
@@ -290,10 +325,6 @@ fn bounded(pdf: f64) -> f32 {
         true => pdf.min(f64::from(f32::MAX)) as f32,
         false => 0.0,
     }
-}
-
-fn positive(x: f64) -> f64 {
-    if x > 0.0 && x.is_finite() { x } else { 0.0 }
 }
 
 fn luminance(c: Rgb64) -> f64 {

@@ -31,6 +31,13 @@ enum Origin {
     Cell([Vec2; 3]),
 }
 
+impl Facet {
+    /// Whether it stands for a part of a curved shape.
+    pub fn is_curved(&self) -> bool {
+        matches!(self.origin, Origin::Cell(_))
+    }
+}
+
 /// Where the facets of a shape at a place are to be found.
 #[derive(Clone, Copy, Debug, Default)]
 struct Slot {

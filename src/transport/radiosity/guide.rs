@@ -105,7 +105,13 @@ impl<'a, G> Guiding<'a, G> {
         let (hit, shading) = (vertex.hit, vertex.shading);
         let rest = 1.0 - share;
         let block = dim::VERTEX + (vertex.edges - 1) * dim::PER_VERTEX + dim::PATCH;
-        let [coarse, fine, ..] = vertex.sampler.get4(block);
+        let coarse = match shading.bsdf {
+            // It chooses nothing else.
+            Bsdf::Diffuse(_) => u_lobe,
+            _ => vertex.sampler.get4(block)[0],
+        };
+        // Need not be well spread.
+        let fine = vertex.sampler.independent().get4(block)[1];
         // Links of little light have smaller probabilities than one number in f32 can tell apart.
         let choice = f64::from(coarse) + f64::from(fine) * STEP_OF_F32;
         let by_guide = choice < f64::from(share);
@@ -136,7 +142,10 @@ impl<'a, G> Guiding<'a, G> {
         if aimed.is_some() && aimed != patch {
             return None;
         }
-        let guide_pdf = patch.map_or(0.0, |patch| self.guide.pdf(receiver, hit.p, wi, patch));
+        let guide_pdf = match (patch, &met) {
+            (Some(patch), Some(met)) => self.guide.pdf(receiver, hit.p, wi, met, patch),
+            _ => 0.0,
+        };
         if aimed.is_some() && guide_pdf == 0.0 {
             return None;
         }
