@@ -91,6 +91,11 @@ pub struct SolveSpec {
     pub max_steps: Option<u64>,
     /// Show light that is not shot yet as if it were spread everywhere (shooting only; display, not result).
     pub ambient: bool,
+    /// Edges of random walks by which the hierarchical solver corrects what links bring, about; 0: it trusts them.
+    pub walks: u64,
+    /// Light at patches has at most so many edges, from its emitter on; `None`: any number (hierarchical solver with
+    /// walks only).
+    pub max_edges: Option<u32>,
     /// Cut patches along the edges of shadows.
     pub discontinuities: bool,
     /// Curved shapes differ from their facets by at most this share of their radius.
@@ -114,6 +119,8 @@ impl Default for SolveSpec {
             residual: 1e-4,
             max_steps: None,
             ambient: true,
+            walks: std::env::var("EDGES").map_or(1 << 20, |s| s.parse().unwrap()),
+            max_edges: std::env::var("MAXE").ok().map(|s| s.parse().unwrap()),
             discontinuities: false,
             curve_error: 0.02,
             gloss_as_diffuse: false,

@@ -5,10 +5,11 @@
 //! down. In a closed scene they are scaled both ways, to 1 less the share of light that meets other things than
 //! patches.
 
+use super::bodies::Parts;
 use super::gather::Field;
-use super::tree::{Kind, NONE, Tree, TreeNode};
-use crate::geom::Hit;
-use crate::math::{DVec2, Frame, Vec2, Vec3, warp};
+use super::tree::{Gain, Kind, NONE, Tree, TreeNode};
+use super::walks::direction;
+use crate::math::{DVec2, Vec2};
 use crate::radiosity::Rgb64;
 use crate::radiosity::mesh::on_facet;
 use crate::sampler::{Sampler, SamplerKind};
@@ -34,24 +35,25 @@ pub struct Balanced {
     pub mean: f64,
 }
 
-/// Sets the scale of all patches, by the sums of their links.
-pub fn balance(tree: &mut Tree, closed: Option<f64>) -> Balanced {
-    for node in &mut tree.nodes {
-        node.scale = 1.0;
+/// Sets the gain of all patches that are in no body, and of the bodies, by the sums of their links.
+pub fn balance(tree: &mut Tree, parts: &Parts, closed: Option<f64>) -> Balanced {
+    let mut field = Field::uniform(tree);
+    let mut sums: Vec<(u32, Rgb64)> = field.gather(tree, parts).concat();
+    for (number, body) in parts.bodies.iter().enumerate() {
+        sums.push((body.node, field.linked_to_body(tree, body, number)));
     }
-    let sums = Field::uniform(tree).gathered(tree);
     let (mut off, mut area) = (0.0, 0.0);
-    for update in sums.iter().flatten() {
-        let node = &mut tree.nodes[update.node as usize];
-        if !is_patch(node) {
-            continue;
-        }
-        let sum = (update.irradiance - node.external).max_element();
-        node.scale = match closed {
+    for (node, sum) in sums {
+        let (node, sum) = (&mut tree.nodes[node as usize], sum.max_element());
+        let scale = match closed {
             Some(wanted) if sum > BURIED * wanted => wanted / sum,
             _ => 1.0f64.min(1.0 / sum),
         };
-        off += (1.0 - node.scale).abs() * node.area;
+        node.gain = Gain {
+            scale: Rgb64::splat(scale),
+            ..Gain::NONE
+        };
+        off += (1.0 - scale).abs() * node.area;
         area += node.area;
     }
     Balanced {
@@ -112,13 +114,4 @@ pub fn absorbs_nothing(tree: &Tree) -> bool {
                 .all(|&i| tree.nodes[i as usize].albedo[c] >= ALL)
     };
     (0..3).any(all_white)
-}
-
-/// A direction away from the front that `hit` is seen from, by its cosine.
-fn direction(hit: &Hit, u: Vec2) -> Vec3 {
-    let front = match hit.ng.dot(hit.wo) < 0.0 {
-        true => -hit.ng,
-        false => hit.ng,
-    };
-    Frame::from_normal(front).to_world(warp::cosine_hemisphere(u))
 }

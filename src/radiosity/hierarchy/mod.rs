@@ -10,15 +10,20 @@
 //! one to the one that is asked for, with solutions between, so that links are judged by the light that there is.
 
 mod balance;
+mod bodies;
 mod cluster;
+mod correct;
 mod estimate;
 mod gather;
 mod output;
 mod refine;
+mod sphere;
 mod tree;
+mod walks;
 
 use super::{Progress, Report, Rgb64, Solution, SolveError, SolveSpec, Surfaces};
 use crate::scene::Scene;
+use bodies::Parts;
 use gather::Field;
 use refine::Refiner;
 use std::ops::{ControlFlow, Range};
@@ -86,6 +91,7 @@ pub fn solve(
     let mut field = Field::new(&tree);
     let most = spec.max_steps.unwrap_or(MAX_STEPS);
     let mut balanced = balance::Balanced::default();
+    let mut parts = Parts::new(&tree);
     for looser in (0..=LOOSER).rev() {
         let clock = Instant::now();
         let error = spec.error * STEP.powi(looser);
@@ -96,16 +102,26 @@ pub fn solve(
         if closed == Some(1.0) && balance::absorbs_nothing(&tree) {
             return Err(SolveError::NoAbsorption);
         }
-        balanced = balance::balance(&mut tree, closed);
+        parts = Parts::new(&tree);
+        balanced = balance::balance(&mut tree, &parts, closed);
+        field.prepare(&tree, &parts);
         report.form_factor_seconds += clock.elapsed().as_secs_f64();
+        eprintln!(
+            "refined {looser} patches {} nodes {} links {} {}",
+            tree.patches,
+            tree.nodes.len(),
+            tree.links(),
+            start.elapsed().as_secs_f64()
+        );
         let clock = Instant::now();
         // Before the last refinement, it is enough to see where light goes.
         let (wanted, until) = match looser {
-            0 => (spec.residual, most),
+            0 if spec.walks == 0 => (spec.residual, most),
             _ => (spec.residual.max(0.02), most.min(report.steps + LOOKS)),
         };
         loop {
-            report.residual = field.step(&tree) / emitted.element_sum().max(f64::MIN_POSITIVE);
+            report.residual =
+                field.step(&tree, &parts) / emitted.element_sum().max(f64::MIN_POSITIVE);
             report.steps += 1;
             report.converged = looser == 0 && report.residual <= wanted;
             let growing = !report.residual.is_finite();
@@ -113,7 +129,13 @@ pub fn solve(
                 break;
             }
         }
+        field.spread(&tree, &parts);
         report.solve_seconds += clock.elapsed().as_secs_f64();
+        eprintln!(
+            "solved {looser} {} steps {}",
+            start.elapsed().as_secs_f64(),
+            report.steps
+        );
         if looser == 0 || report.steps >= most {
             break;
         }
@@ -122,6 +144,19 @@ pub fn solve(
         }
     }
     report.links = tree.links();
+    let mut direct = None;
+    if report.residual.is_finite() && spec.walks > 0 {
+        let clock = Instant::now();
+        direct = Some(correct::correct(
+            scene,
+            &mut tree,
+            &parts,
+            &mut field,
+            spec,
+            &mut report,
+        ));
+        report.solve_seconds += clock.elapsed().as_secs_f64();
+    }
     if balanced.mean > MUCH {
         let to = if balanced.closed { "to" } else { "down to" };
         report.warnings.push(format!(
@@ -130,7 +165,10 @@ pub fn solve(
             100.0 * balanced.mean
         ));
     }
-    let solution = output::solution(scene, &tree, &field, report);
+    eprintln!("corrected {}", start.elapsed().as_secs_f64());
+    let direct = direct.unwrap_or_else(|| correct::straight(&tree, &parts));
+    let solution = output::solution(scene, &tree, &field, &direct, report);
+    eprintln!("output {}", start.elapsed().as_secs_f64());
     if solution.mesh.is_empty() {
         return Err(SolveError::NoPatches);
     }

@@ -65,7 +65,7 @@ impl Default for CacheSpec {
         CacheSpec {
             indirect: Indirect::None,
             solve: SolveSpec {
-                error: GATHER_ERROR,
+                error: std::env::var("ERR").map_or(GATHER_ERROR, |s| s.parse().unwrap()),
                 residual: CACHE_RESIDUAL,
                 gloss_as_diffuse: true,
                 ..SolveSpec::default()

@@ -158,7 +158,13 @@ impl<'a> Solving<'a> {
     pub fn of(scene: &'a Scene, cache: &'a CacheSpec) -> Solving<'a> {
         let made_for = match cache.indirect {
             Indirect::Guide => Use::Guide,
-            Indirect::None | Indirect::Gather => Use::Smooth,
+            Indirect::None | Indirect::Gather => {
+                if std::env::var("FLAT").is_ok() {
+                    Use::Flat
+                } else {
+                    Use::Smooth
+                }
+            }
         };
         Solving::new(scene, &cache.solve, cache.given.as_ref(), made_for)
     }
@@ -197,7 +203,9 @@ impl<'a> Solving<'a> {
                 Err(error) => return Err(error),
             },
         };
+        let clock = Instant::now();
         let cache = Cache::new(solution, self.scene, self.made_for);
+        eprintln!("cache {}", clock.elapsed().as_secs_f64());
         // Without links, nothing to be guided by.
         Ok((self.made_for != Use::Guide || cache.guide.is_some()).then_some(cache))
     }

@@ -1,0 +1,356 @@
+//! What arrives at patches by rays, to put links right.
+//!
+//! Links err one by one: what one ray too few found to be blocked brings nothing, and a gap that many links go
+//! through is too dark by all of them. So where it counts, random walks from surface to surface look at the scene
+//! itself. Each edge of a walk, from a point x in a direction by the cosine to the point y, is a sample of the
+//! irradiance at x: E(x) = π ⟨L(y → x)⟩, with L(y → x) = ρ E(y) / π from the solution. The light that links bring to a
+//! node is then scaled so that it is, in the mean over the points that walks left from, what arrived by them.
+//!
+//! Since walks meet surfaces as light does, points count by what they see of the scene: the parts of a patch that
+//! lie behind a wall or within another body have no walks, and do not darken the rest. On the way, mirrors, glass
+//! and gloss do to a walk what they do to light.
+
+use super::bodies::Parts;
+use super::gather::Field;
+use super::tree::{Gain, Kind, NONE, Tree};
+use crate::bsdf::Mode;
+use crate::geom::Hit;
+use crate::math::{DVec2, Frame, Rgb, Vec2, Vec3, warp};
+use crate::radiosity::mesh::on_facet;
+use crate::radiosity::optics::rgb64;
+use crate::radiosity::{PatchMesh, Rgb64, SolveSpec};
+use crate::sampler::{Sampler, SamplerKind};
+use crate::scene::Scene;
+use rayon::prelude::*;
+
+/// Edges of a walk between diffuse surfaces, at most: enough to get around in a building.
+const LONGEST: u32 = 32;
+/// Mirrors, glass and gloss in a row, at most.
+const PASSES: u32 = 8;
+/// Edges that weigh as much as what is known of the surroundings already.
+const PRIOR: f64 = 256.0;
+
+/// Points that walks left from, and what arrives there.
+pub struct Walks {
+    /// By patch: how many points it has.
+    visits: Vec<u32>,
+    /// By patch: irradiance straight from emitters, summed over its points, in W/m².
+    pub direct: Vec<Rgb64>,
+    /// What edges found; those from patch i are `first[i]..first[i + 1]`.
+    terms: Vec<Term>,
+    first: Vec<u32>,
+    /// By patch: its node.
+    pub leaf: Vec<u32>,
+}
+
+/// An edge brings `weight` times the irradiance of patch `to`.
+#[derive(Clone, Copy)]
+struct Term {
+    from: u32,
+    to: u32,
+    weight: [f32; 3],
+}
+
+/// What one walk met.
+#[derive(Default)]
+struct Walk {
+    /// Patches, and the irradiance straight from emitters.
+    visits: Vec<(u32, Rgb)>,
+    terms: Vec<Term>,
+}
+
+impl Walks {
+    /// About `edges` edges; fewer where they leave the scene soon. Walks start where the light of `field` leaves
+    /// patches, and go on with equal chances, however dark a surface is.
+    pub fn new(
+        scene: &Scene,
+        tree: &Tree,
+        (mesh, leaf): (&PatchMesh, Vec<u32>),
+        field: &Field,
+        spec: &SolveSpec,
+    ) -> Walks {
+        let (edges, seed) = (spec.walks, spec.seed);
+        let mut sums = Vec::with_capacity(leaf.len());
+        let mut sum = 0.0;
+        for (patch, &node) in mesh.patches.iter().zip(&leaf) {
+            sum += (field.radiosity[node as usize].element_sum() * patch.area).max(0.0);
+            sums.push(sum);
+        }
+        let mut visits = vec![0; leaf.len()];
+        let mut terms = Vec::new();
+        let mut direct = vec![Rgb64::ZERO; leaf.len()];
+        let (mut made, mut number) = (0, 0);
+        // Rounds, until there are enough edges.
+        let round = edges.div_ceil(u64::from(LONGEST)).max(1);
+        const ROUNDS: u64 = LONGEST as u64;
+        while sum.is_finite() && sum > 0.0 && made < edges && number < round * ROUNDS {
+            let walk = |i: u64| {
+                let sampler = Sampler::new(SamplerKind::Sobol, seed, u64::MAX - 1, i, 1);
+                let [x, y, pick, _] = sampler.get4(0);
+                let at = f64::from(pick) * sum;
+                let patch = sums.partition_point(|s| *s <= at).min(sums.len() - 1);
+                let Kind::Surface { facet, piece } = tree.nodes[leaf[patch] as usize].kind else {
+                    return Walk::default();
+                };
+                let st = piece.outline.sample(DVec2::new(f64::from(x), f64::from(y)));
+                let hit = on_facet(scene, &tree.surfaces, facet, &piece, st);
+                Walk::from(scene, mesh, patch as u32, hit, &sampler)
+            };
+            let found: Vec<Walk> = (number..number + round).into_par_iter().map(walk).collect();
+            number += round;
+            for walk in found {
+                for &(from, lit) in &walk.visits {
+                    visits[from as usize] += 1;
+                    direct[from as usize] += rgb64(lit);
+                }
+                made += walk.visits.len() as u64;
+                terms.extend(walk.terms);
+            }
+        }
+        terms.par_sort_by_key(|t| t.from);
+        let start = |i: u32| terms.partition_point(|t| t.from < i) as u32;
+        let first = (0..=mesh.len() as u32).into_par_iter().map(start).collect();
+        Walks {
+            visits,
+            direct,
+            terms,
+            first,
+            leaf,
+        }
+    }
+
+    /// Patches that walks met.
+    pub fn met(&self) -> Vec<u32> {
+        let mut met = vec![false; self.leaf.len()];
+        for (met, visits) in met.iter_mut().zip(&self.visits) {
+            *met = *visits > 0;
+        }
+        for term in &self.terms {
+            met[term.to as usize] = true;
+        }
+        let patches = 0..self.leaf.len() as u32;
+        patches.filter(|i| met[*i as usize]).collect()
+    }
+
+    /// What arrives at the points that walks left from, summed by patch, if patches have `irradiance` (by patch).
+    pub fn arriving(&self, irradiance: &[Rgb64]) -> Vec<Rgb64> {
+        let of = |patch: usize| {
+            let range = self.first[patch] as usize..self.first[patch + 1] as usize;
+            let term =
+                |t: &Term| Rgb64::from_array(t.weight.map(f64::from)) * irradiance[t.to as usize];
+            self.terms[range].iter().map(term).sum()
+        };
+        (0..self.leaf.len()).into_par_iter().map(of).collect()
+    }
+
+    /// What makes of `linked`, what links bring to patches, what `arrived` at the points that walks left from (both
+    /// by patch, the latter summed over its points): by node of `order`.
+    pub fn gains(
+        &self,
+        tree: &Tree,
+        order: &Order,
+        arrived: &[Rgb64],
+        linked: &[Rgb64],
+    ) -> Vec<Gain> {
+        let mut sums = vec![Sums::default(); order.nodes.len()];
+        for (patch, &arrived) in arrived
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| self.visits[*i] > 0)
+        {
+            let n = f64::from(self.visits[patch]);
+            sums[order.number[self.leaf[patch] as usize] as usize].add(&Sums {
+                n,
+                arrived,
+                linked: linked[patch] * n,
+            });
+        }
+        // Nodes come before what they contain.
+        let above = |i: usize| match tree.nodes[order.nodes[i] as usize].parent {
+            NONE => None,
+            parent => Some(order.number[parent as usize] as usize),
+        };
+        for i in (0..sums.len()).rev() {
+            if let Some(above) = above(i) {
+                let below = sums[i];
+                sums[above].add(&below);
+            }
+        }
+        let mut out: Vec<Gain> = Vec::with_capacity(sums.len());
+        for (i, sums) in sums.iter().enumerate() {
+            let above = above(i).map_or(Gain::NONE, |above| out[above]);
+            out.push(sums.gain(&above));
+        }
+        out
+    }
+}
+
+/// Nodes that have gains, those above before those below.
+pub struct Order {
+    pub nodes: Vec<u32>,
+    /// By node: its number in this order; of nodes in a body, that of the body.
+    pub number: Vec<u32>,
+}
+
+impl Order {
+    /// All nodes, or those that exchange light.
+    pub fn new(tree: &Tree, parts: Option<&Parts>) -> Order {
+        let mut order = Order {
+            nodes: Vec::new(),
+            number: vec![NONE; tree.nodes.len()],
+        };
+        for node in 0..tree.nodes.len() as u32 {
+            let body = parts.map_or(NONE, |parts| parts.body_of[node as usize]);
+            let body = parts
+                .filter(|_| body != NONE)
+                .map(|parts| parts.bodies[body as usize].node);
+            order.number[node as usize] = match body {
+                Some(body) if body != node => order.number[body as usize],
+                _ => {
+                    order.nodes.push(node);
+                    order.nodes.len() as u32 - 1
+                }
+            };
+        }
+        order
+    }
+}
+
+/// Of the points in a node.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    n: f64,
+    arrived: Rgb64,
+    linked: Rgb64,
+}
+
+impl Sums {
+    fn add(&mut self, o: &Sums) {
+        self.n += o.n;
+        self.arrived += o.arrived;
+        self.linked += o.linked;
+    }
+
+    /// What was found here, and what is known of the node above, by what they are worth.
+    fn gain(&self, above: &Gain) -> Gain {
+        /// By how much links may be scaled up; what is still missing is added, the same everywhere.
+        const MOST: f64 = 4.0;
+        if self.n <= 0.0 {
+            return *above;
+        }
+        let share = PRIOR / self.n;
+        let arrived = self.arrived + (self.linked * above.scale + above.more * self.n) * share;
+        let linked = self.linked * (1.0 + share);
+        let of = |c: usize| {
+            let ratio = arrived[c] / linked[c];
+            match ratio.is_finite() {
+                true => ratio.min(MOST),
+                false => 1.0,
+            }
+        };
+        let scale = Rgb64::new(of(0), of(1), of(2));
+        let more = (arrived - scale * linked).max(Rgb64::ZERO) / (self.n * (1.0 + share));
+        Gain { scale, more }
+    }
+}
+
+impl Walk {
+    /// From `hit` on patch `from`.
+    fn from(
+        scene: &Scene,
+        mesh: &PatchMesh,
+        mut from: u32,
+        mut hit: Hit,
+        sampler: &Sampler,
+    ) -> Walk {
+        let mut walk = Walk::default();
+        let mut block = 1;
+        for _ in 0..LONGEST {
+            let [u, v, ..] = sampler.get4(block);
+            block += 1;
+            walk.visits
+                .push((from, lit_straight(scene, &hit, sampler, block)));
+            block += 1;
+            let wi = direction(&hit, Vec2::new(u, v));
+            match walk.follow(scene, mesh, (from, hit), wi, sampler, &mut block) {
+                Some(next) => (from, hit) = next,
+                None => break,
+            }
+        }
+        walk
+    }
+
+    /// Looks along `wi` from `hit`, by what mirrors and glass show: gives the first diffuse surface.
+    fn follow(
+        &mut self,
+        scene: &Scene,
+        mesh: &PatchMesh,
+        (from, mut hit): (u32, Hit),
+        mut wi: Vec3,
+        sampler: &Sampler,
+        block: &mut u32,
+    ) -> Option<(u32, Hit)> {
+        let mut next = None;
+        let mut throughput = Rgb::WHITE;
+        for _ in 0..PASSES {
+            let Some(met) = scene.intersect(&hit.spawn(wi)) else {
+                break;
+            };
+            hit = met;
+            let [u, v, lobe, mixed] = sampler.get4(*block);
+            *block += 1;
+            let shading = scene.shade(&hit, mixed);
+            let diffuse = shading.diffuse_share();
+            let found = match diffuse.is_black() {
+                true => None,
+                false => mesh.locate(&hit),
+            };
+            if let Some(at) = found {
+                let weight = (throughput * diffuse).to_array();
+                self.terms.push(Term {
+                    from,
+                    to: at.patch,
+                    weight,
+                });
+                next = next.or(Some((at.patch, hit)));
+            }
+            let Some(rest) = shading.without_diffuse() else {
+                break;
+            };
+            let Some(sample) = rest.sample(lobe, Vec2::new(u, v), Mode::Radiance) else {
+                break;
+            };
+            throughput = throughput * sample.weight;
+            wi = sample.wi;
+        }
+        next
+    }
+}
+
+/// One sample of the irradiance at `hit` straight from emitters, in W/m².
+fn lit_straight(scene: &Scene, hit: &Hit, sampler: &Sampler, block: u32) -> Rgb {
+    let [u, v, pick, _] = sampler.get4(block);
+    let Some(sample) = scene.sample_light(hit, pick, Vec2::new(u, v)) else {
+        return Rgb::BLACK;
+    };
+    let (cos, weight) = (front(hit).dot(sample.wi), sample.weight());
+    if cos <= 0.0 || weight.is_black() {
+        return Rgb::BLACK;
+    }
+    let passes = scene.transmittance(&sample.shadow_ray(hit), PASSES);
+    let lit = weight * (cos * passes);
+    if lit.is_finite() { lit } else { Rgb::BLACK }
+}
+
+/// A direction away from the front that `hit` is seen from, by its cosine.
+pub fn direction(hit: &Hit, u: Vec2) -> Vec3 {
+    Frame::from_normal(front(hit)).to_world(warp::cosine_hemisphere(u))
+}
+
+/// The normal on the side that `hit` is seen from.
+fn front(hit: &Hit) -> Vec3 {
+    match hit.ng.dot(hit.wo) < 0.0 {
+        true => -hit.ng,
+        false => hit.ng,
+    }
+}
