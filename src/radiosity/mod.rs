@@ -8,6 +8,7 @@
 //! What other lobes than diffuse ones do to light is left out. The result is biased; it converges with the size
 //! of the patches for scenes of diffuse surfaces.
 
+pub mod dark;
 pub mod discontinuity;
 pub mod display;
 pub mod export;
@@ -30,10 +31,11 @@ pub use guide::Guide;
 pub use hierarchy::Hierarchy;
 pub use mesh::{Located, Patch, PatchMesh};
 pub use piece::{Outline, Piece};
-pub use surfaces::Surfaces;
+pub use surfaces::{Cut, Surfaces};
 
 use crate::math::DVec3;
 use crate::scene::Scene;
+use dark::DarkSides;
 use std::fmt;
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -70,6 +72,18 @@ pub enum Solver {
     Hierarchical,
 }
 
+/// What becomes of light that surfaces scatter in other ways than diffusely: by mirrors, gloss, glass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Gloss {
+    /// It is lost: what is left is radiosity as its equation says.
+    LeftOut,
+    /// Walks follow it from one diffuse surface to the next ([`SolveSpec::walks`]).
+    BetweenDiffuse,
+    /// Also from emitters; and links take what opaque surfaces reflect for diffuse, so that it goes astray before walks
+    /// put it right: better for guiding walks, and for what they read.
+    All,
+}
+
 /// What is solved, and how well.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SolveSpec {
@@ -100,9 +114,11 @@ pub struct SolveSpec {
     pub discontinuities: bool,
     /// Curved shapes differ from their facets by at most this share of their radius.
     pub curve_error: f64,
-    /// Treat what opaque surfaces reflect in other ways than diffusely as if it were diffuse. The light is then not
-    /// lost to the solution, but goes astray: better for guiding walks, and for what they read.
-    pub gloss_as_diffuse: bool,
+    /// What becomes of light that surfaces scatter in other ways than diffusely.
+    pub gloss: Gloss,
+    /// Leave out sides of surfaces that walks of light never meet, though they often meet the other side: insides of
+    /// closed bodies. Where they are met after all, they have no patches.
+    pub lit_only: bool,
     /// Most patches; more are an error before anything is solved.
     pub max_patches: u64,
     pub seed: u64,
@@ -119,11 +135,12 @@ impl Default for SolveSpec {
             residual: 1e-4,
             max_steps: None,
             ambient: true,
-            walks: std::env::var("EDGES").map_or(1 << 20, |s| s.parse().unwrap()),
-            max_edges: std::env::var("MAXE").ok().map(|s| s.parse().unwrap()),
+            walks: 1 << 20,
+            max_edges: None,
             discontinuities: false,
             curve_error: 0.02,
-            gloss_as_diffuse: false,
+            gloss: Gloss::LeftOut,
+            lit_only: false,
             max_patches: 4_000_000,
             seed: 0,
         }
@@ -296,7 +313,16 @@ pub fn solve(
     spec: &SolveSpec,
     observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Solution, SolveError> {
-    let surfaces = Arc::new(Surfaces::of(scene, spec.curve_error, spec.gloss_as_diffuse));
+    let dark = match spec.lit_only {
+        true => DarkSides::of(scene, spec.seed),
+        false => DarkSides::default(),
+    };
+    let cut = Cut {
+        curve_error: spec.curve_error,
+        gloss_as_diffuse: spec.gloss == Gloss::All,
+        dark,
+    };
+    let surfaces = Arc::new(Surfaces::of(scene, cut));
     if surfaces.facets().is_empty() {
         return Err(SolveError::NoPatches);
     }

@@ -64,6 +64,8 @@ pub struct Hierarchy {
 const STEP: f64 = 4.0;
 /// Refinements before the last, at most.
 const LOOSER: i32 = 4;
+/// The largest error that is worth a refinement.
+const LOOSEST: f64 = 0.2;
 /// Gathering steps before each refinement but the first, at most.
 const LOOKS: u64 = 5;
 /// Scaling of form factors that is worth a warning, in the mean.
@@ -92,7 +94,8 @@ pub fn solve(
     let most = spec.max_steps.unwrap_or(MAX_STEPS);
     let mut balanced = balance::Balanced::default();
     let mut parts = Parts::new(&tree);
-    for looser in (0..=LOOSER).rev() {
+    let looser = (LOOSEST / spec.error).log(STEP).floor() as i32;
+    for looser in (0..=looser.clamp(0, LOOSER)).rev() {
         let clock = Instant::now();
         let error = spec.error * STEP.powi(looser);
         // What few links make dark may be brighter than it seems.

@@ -13,12 +13,12 @@
 use super::bodies::Parts;
 use super::gather::Field;
 use super::tree::{Gain, Kind, NONE, Tree};
-use crate::bsdf::Mode;
+use crate::bsdf::{Bsdf, Mode};
 use crate::geom::Hit;
-use crate::math::{DVec2, Frame, Rgb, Vec2, Vec3, warp};
+use crate::math::{DVec2, Frame, PI, Rgb, Vec2, Vec3, warp};
 use crate::radiosity::mesh::on_facet;
 use crate::radiosity::optics::rgb64;
-use crate::radiosity::{PatchMesh, Rgb64, SolveSpec};
+use crate::radiosity::{Gloss, PatchMesh, Rgb64, SolveSpec};
 use crate::sampler::{Sampler, SamplerKind};
 use crate::scene::Scene;
 use rayon::prelude::*;
@@ -36,6 +36,8 @@ pub struct Walks {
     visits: Vec<u32>,
     /// By patch: irradiance straight from emitters, summed over its points, in W/m².
     pub direct: Vec<Rgb64>,
+    /// The same from emitters by mirrors, glass and gloss.
+    stray: Vec<Rgb64>,
     /// What edges found; those from patch i are `first[i]..first[i + 1]`.
     terms: Vec<Term>,
     first: Vec<u32>,
@@ -54,9 +56,15 @@ struct Term {
 /// What one walk met.
 #[derive(Default)]
 struct Walk {
-    /// Patches, and the irradiance straight from emitters.
-    visits: Vec<(u32, Rgb)>,
+    visits: Vec<Visit>,
     terms: Vec<Term>,
+}
+
+/// Irradiance at a point of a patch, in W/m²: straight from emitters, and from these by mirrors, glass and gloss.
+struct Visit {
+    patch: u32,
+    direct: Rgb,
+    stray: Rgb,
 }
 
 impl Walks {
@@ -79,6 +87,7 @@ impl Walks {
         let mut visits = vec![0; leaf.len()];
         let mut terms = Vec::new();
         let mut direct = vec![Rgb64::ZERO; leaf.len()];
+        let mut stray = direct.clone();
         let (mut made, mut number) = (0, 0);
         // Rounds, until there are enough edges.
         let round = edges.div_ceil(u64::from(LONGEST)).max(1);
@@ -94,14 +103,24 @@ impl Walks {
                 };
                 let st = piece.outline.sample(DVec2::new(f64::from(x), f64::from(y)));
                 let hit = on_facet(scene, &tree.surfaces, facet, &piece, st);
-                Walk::from(scene, mesh, patch as u32, hit, &sampler)
+                let walker = Walker {
+                    scene,
+                    mesh,
+                    gloss: spec.gloss,
+                    sampler,
+                    blocks: 0,
+                    walk: Walk::default(),
+                };
+                walker.walk(patch as u32, hit)
             };
             let found: Vec<Walk> = (number..number + round).into_par_iter().map(walk).collect();
             number += round;
             for walk in found {
-                for &(from, lit) in &walk.visits {
-                    visits[from as usize] += 1;
-                    direct[from as usize] += rgb64(lit);
+                for visit in &walk.visits {
+                    let patch = visit.patch as usize;
+                    visits[patch] += 1;
+                    direct[patch] += rgb64(visit.direct);
+                    stray[patch] += rgb64(visit.stray);
                 }
                 made += walk.visits.len() as u64;
                 terms.extend(walk.terms);
@@ -113,6 +132,7 @@ impl Walks {
         Walks {
             visits,
             direct,
+            stray,
             terms,
             first,
             leaf,
@@ -138,7 +158,10 @@ impl Walks {
             let range = self.first[patch] as usize..self.first[patch + 1] as usize;
             let term =
                 |t: &Term| Rgb64::from_array(t.weight.map(f64::from)) * irradiance[t.to as usize];
-            self.terms[range].iter().map(term).sum()
+            self.terms[range]
+                .iter()
+                .map(term)
+                .fold(self.stray[patch], |a, b| a + b)
         };
         (0..self.leaf.len()).into_par_iter().map(of).collect()
     }
@@ -254,82 +277,95 @@ impl Sums {
     }
 }
 
-impl Walk {
+/// On its way.
+struct Walker<'a> {
+    scene: &'a Scene,
+    mesh: &'a PatchMesh,
+    gloss: Gloss,
+    sampler: Sampler,
+    /// Numbers that are used up.
+    blocks: u32,
+    walk: Walk,
+}
+
+impl Walker<'_> {
+    fn numbers(&mut self) -> [f32; 4] {
+        self.blocks += 1;
+        self.sampler.get4(self.blocks)
+    }
+
     /// From `hit` on patch `from`.
-    fn from(
-        scene: &Scene,
-        mesh: &PatchMesh,
-        mut from: u32,
-        mut hit: Hit,
-        sampler: &Sampler,
-    ) -> Walk {
-        let mut walk = Walk::default();
-        let mut block = 1;
+    fn walk(mut self, mut from: u32, mut hit: Hit) -> Walk {
         for _ in 0..LONGEST {
-            let [u, v, ..] = sampler.get4(block);
-            block += 1;
-            walk.visits
-                .push((from, lit_straight(scene, &hit, sampler, block)));
-            block += 1;
+            let direct = lit_straight(self.scene, &hit, self.numbers());
+            let [u, v, ..] = self.numbers();
             let wi = direction(&hit, Vec2::new(u, v));
-            match walk.follow(scene, mesh, (from, hit), wi, sampler, &mut block) {
+            let (stray, next) = self.follow(from, hit, wi);
+            self.walk.visits.push(Visit {
+                patch: from,
+                direct,
+                stray,
+            });
+            match next {
                 Some(next) => (from, hit) = next,
                 None => break,
             }
         }
-        walk
+        self.walk
     }
 
-    /// Looks along `wi` from `hit`, by what mirrors and glass show: gives the first diffuse surface.
-    fn follow(
-        &mut self,
-        scene: &Scene,
-        mesh: &PatchMesh,
-        (from, mut hit): (u32, Hit),
-        mut wi: Vec3,
-        sampler: &Sampler,
-        block: &mut u32,
-    ) -> Option<(u32, Hit)> {
+    /// Looks along `wi` from `hit` on patch `from`, by what mirrors and glass show: gives irradiance by the emitters
+    /// that these show, and the first diffuse surface.
+    fn follow(&mut self, from: u32, mut hit: Hit, mut wi: Vec3) -> (Rgb, Option<(u32, Hit)>) {
         let mut next = None;
-        let mut throughput = Rgb::WHITE;
+        let (mut throughput, mut stray, mut bent) = (Rgb::WHITE, Rgb::BLACK, false);
         for _ in 0..PASSES {
-            let Some(met) = scene.intersect(&hit.spawn(wi)) else {
+            let Some(met) = self.scene.intersect(&hit.spawn(wi)) else {
+                if bent {
+                    stray += throughput * self.scene.le_escaped(wi) * PI;
+                }
                 break;
             };
             hit = met;
-            let [u, v, lobe, mixed] = sampler.get4(*block);
-            *block += 1;
-            let shading = scene.shade(&hit, mixed);
+            if bent {
+                stray += throughput * self.scene.le(&hit) * PI;
+            }
+            let [u, v, lobe, mixed] = self.numbers();
+            let shading = self.scene.shade(&hit, mixed);
             let diffuse = shading.diffuse_share();
             let found = match diffuse.is_black() {
                 true => None,
-                false => mesh.locate(&hit),
+                false => self.mesh.locate(&hit),
             };
             if let Some(at) = found {
-                let weight = (throughput * diffuse).to_array();
-                self.terms.push(Term {
+                self.walk.terms.push(Term {
                     from,
                     to: at.patch,
-                    weight,
+                    weight: (throughput * diffuse).to_array(),
                 });
                 next = next.or(Some((at.patch, hit)));
             }
             let Some(rest) = shading.without_diffuse() else {
                 break;
             };
+            let straight = matches!(rest.bsdf, Bsdf::Null(_));
+            if self.gloss == Gloss::LeftOut && !straight {
+                break;
+            }
             let Some(sample) = rest.sample(lobe, Vec2::new(u, v), Mode::Radiance) else {
                 break;
             };
+            bent |= !straight;
             throughput = throughput * sample.weight;
             wi = sample.wi;
         }
-        next
+        let counts = self.gloss == Gloss::All && stray.is_finite();
+        (if counts { stray } else { Rgb::BLACK }, next)
     }
 }
 
 /// One sample of the irradiance at `hit` straight from emitters, in W/m².
-fn lit_straight(scene: &Scene, hit: &Hit, sampler: &Sampler, block: u32) -> Rgb {
-    let [u, v, pick, _] = sampler.get4(block);
+fn lit_straight(scene: &Scene, hit: &Hit, [u, v, pick, _]: [f32; 4]) -> Rgb {
     let Some(sample) = scene.sample_light(hit, pick, Vec2::new(u, v)) else {
         return Rgb::BLACK;
     };
