@@ -7,7 +7,7 @@ mod furnace;
 mod rooms;
 
 use luxel::math::DVec2;
-use luxel::radiosity::{self, FormFactorMethod, Rgb64, Solution, SolveSpec, Solver};
+use luxel::radiosity::{self, FormFactorMethod, Report, Rgb64, Solution, SolveSpec, Solver};
 use luxel::scene::Scene;
 use std::ops::ControlFlow;
 
@@ -29,12 +29,11 @@ fn direct(scene: &Scene, size: f64, samples: u32) -> Solution {
     )
 }
 
-fn hierarchical(scene: &Scene, error: f64, patch_size: Option<f64>, min_size: f64) -> Solution {
+fn hierarchical(scene: &Scene, error: f64, min_size: f64) -> Solution {
     solve(
         scene,
         &SolveSpec {
             error,
-            patch_size,
             min_size: Some(min_size),
             residual: 1e-6,
             ..SolveSpec::default()
@@ -59,148 +58,101 @@ fn on_patches_of(scene: &Scene, goal: &Solution, found: &Solution) -> Vec<Rgb64>
     (0..goal.mesh.len() as u32).map(mean).collect()
 }
 
+/// How far irradiance is off, in all channels together; what reflects nothing is left out.
 #[derive(Debug)]
 struct Off {
-    /// Root of the mean square of the difference of irradiance, by area, over the mean irradiance.
+    /// Root of the mean square by area, over the mean irradiance.
     rms: f64,
-    /// Mean difference over mean irradiance.
+    /// Mean by area, over the mean irradiance.
     bias: f64,
-    /// The mean of the absolute difference over what is there.
+    /// Mean by area of the share of what is there.
     relative: f64,
-    largest: f64,
 }
 
 fn off(goal: &Solution, found: &[Rgb64]) -> Off {
-    let (mut area, mut mean, mut square, mut sum) = (0.0, 0.0, 0.0, 0.0);
-    let (mut relative, mut largest) = (0.0, 0.0f64);
+    let (mut area, mut mean, mut square, mut sum, mut relative) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for ((patch, e), f) in goal.mesh.patches.iter().zip(&goal.irradiance).zip(found) {
         if patch.albedo == Rgb64::ZERO {
             continue;
         }
-        let (e, f) = (e.element_sum() / 3.0, f.element_sum() / 3.0);
-        let a = patch.area;
-        area += a;
-        mean += a * e;
-        sum += a * (f - e);
-        square += a * (f - e) * (f - e);
+        let (e, f) = (e.element_sum(), f.element_sum());
+        area += patch.area;
+        mean += patch.area * e;
+        sum += patch.area * (f - e);
+        square += patch.area * (f - e) * (f - e);
         if e > 0.0 {
-            relative += a * ((f - e) / e).abs();
+            relative += patch.area * ((f - e) / e).abs();
         }
-        largest = largest.max((f - e).abs());
     }
     mean /= area;
     Off {
         rms: (square / area).sqrt() / mean,
         bias: sum / area / mean,
         relative: relative / area,
-        largest: largest / mean,
     }
 }
 
+/// Edges of the squares, of which a wall has 8 by 8.
+const SIZE: f64 = 0.25;
+/// Rays for each pair of squares: by these the direct solution errs by 0.3 to 0.7 % (against 256).
+const SAMPLES: u32 = 16;
+
+/// What `error` promises: no link errs by more than that (see `SolveSpec::error`), so all of them together, if none
+/// made up for another, by no more than so many times that.
+///
+/// And what comes of it: the error falls until patches cannot be divided any more, which here ends at the direct
+/// solution's squares. What is left then is shadows, by few rays for each pair. Measured: 3.5 to 6.6 % at 1e-4, 3.5 to
+/// 5.4 % at 1e-5, the mean within 0.6 %, the direct solution's own error included; allowed is a fifth more, and of the
+/// mean, which is the difference of large numbers of either sign, 2 %.
 #[test]
-#[ignore = "measures"]
-fn measure() {
-    let size: f64 = std::env::var("SIZE").map_or(0.25, |s| s.parse().unwrap());
-    let samples: u32 = std::env::var("SAMPLES").map_or(36, |s| s.parse().unwrap());
-    let flat = std::env::var("FLAT").is_ok();
+fn smaller_errors_of_links_come_nearer_to_the_direct_solution() {
     for room in rooms::ALL {
         let scene = room.scene();
-        let goal = direct(&scene, size, samples);
-        let r = &goal.report;
-        println!(
-            "{room:?} direct: {} patches {:.2} s, escaped {:.5}",
-            r.patches,
-            r.form_factor_seconds,
-            r.escaped.element_sum() / r.emitted.element_sum()
-        );
-        for error in [1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 1e-6] {
-            let found = hierarchical(&scene, error, flat.then_some(size), size);
-            let o = off(&goal, &on_patches_of(&scene, &goal, &found));
-            let r = &found.report;
-            println!(
-                "  {error:.0e}: {} patches {} links {:.2} s rms {:.5} bias {:+.5} relative {:.5} largest {:.4} {:?}",
-                r.patches,
-                r.links,
-                r.form_factor_seconds + r.solve_seconds,
-                o.rms,
-                o.bias,
-                o.relative,
-                o.largest,
-                r.warnings
-            );
-        }
+        let goal = direct(&scene, SIZE, SAMPLES);
+        assert!((200..2000).contains(&goal.mesh.len()));
+        let by = |error| {
+            let found = hierarchical(&scene, error, SIZE);
+            let off = off(&goal, &on_patches_of(&scene, &goal, &found));
+            let most = found.report.links as f64 * error;
+            assert!(off.relative < most, "{room:?} {error}: {off:?}");
+            off
+        };
+        let [coarse, _, usual, fine] = [1e-2, 1e-3, 1e-4, 1e-5].map(by);
+        let all = format!("{room:?}: {coarse:?} {usual:?} {fine:?}");
+        assert!(usual.rms < 0.5 * coarse.rms, "{all}");
+        assert!(usual.rms < 0.08 && fine.rms < 0.065, "{all}");
+        assert!(usual.bias.abs().max(fine.bias.abs()) < 0.02, "{all}");
     }
 }
 
+/// Prints both errors for the squares `SIZE` and `SAMPLES` of the environment, and patches down to `MIN_SIZE`.
 #[test]
-#[ignore = "measures"]
-fn occluded() {
-    for room in [rooms::Room::Body, rooms::Room::Door, rooms::Room::SmallLamp] {
+#[ignore = "prints a table; it checks nothing"]
+fn table() {
+    let given = |name: &str, usual: f64| {
+        let text = std::env::var(name).ok();
+        text.map_or(usual, |text| text.parse().unwrap())
+    };
+    let size = given("SIZE", SIZE);
+    for room in rooms::ALL {
         let scene = room.scene();
-        let goal = direct(&scene, 0.25, 256);
+        let goal = direct(&scene, size, given("SAMPLES", 36.0) as u32);
+        let escaped = goal.report.escaped.element_sum() / goal.report.emitted.element_sum();
         println!(
-            "{room:?} escaped {} warnings {:?}",
-            goal.report.escaped.y / goal.report.emitted.y,
-            goal.report.warnings
+            "{room:?}: {} patches, escaped {escaped:.4}",
+            goal.mesh.len()
         );
-        for samples in [4, 16, 36, 64] {
-            let other = direct(&scene, 0.25, samples);
-            println!("  reference {samples}: {:?}", off(&goal, &other.irradiance));
-        }
-        for (error, flat) in [
-            (1e-5, None),
-            (1e-6, None),
-            (1e-5, Some(0.25)),
-            (1e-6, Some(0.25)),
-            (1e-7, Some(0.25)),
-        ] {
-            let found = hierarchical(&scene, error, flat, 0.25);
-            let f = on_patches_of(&scene, &goal, &found);
+        for error in [1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 1e-6] {
+            let found = hierarchical(&scene, error, given("MIN_SIZE", size));
+            let Off {
+                rms,
+                bias,
+                relative,
+            } = off(&goal, &on_patches_of(&scene, &goal, &found));
+            let Report { patches, links, .. } = found.report;
             println!(
-                "  {error:.0e} {flat:?} {} links: {:?}",
-                found.report.links,
-                off(&goal, &f)
+                "  {error:.0e}: {patches} patches, {links} links, rms {rms:.4}, relative {relative:.4}, bias {bias:+.4}"
             );
-            let mut direct = off(
-                &Solution {
-                    irradiance: goal.direct.clone(),
-                    ..direct(&scene, 0.25, 1)
-                },
-                &on_patches_of(
-                    &scene,
-                    &goal,
-                    &Solution {
-                        irradiance: found.direct.clone(),
-                        ..hierarchical(&scene, error, flat, 0.25)
-                    },
-                ),
-            );
-            direct.largest = 0.0;
-            println!("     direct {direct:?}");
-            let mut worst: Vec<(f64, usize)> = goal
-                .irradiance
-                .iter()
-                .zip(&f)
-                .enumerate()
-                .filter(|(i, _)| goal.mesh.patches[*i].albedo.y > 0.0)
-                .map(|(i, (a, b))| ((b.y - a.y), i))
-                .collect();
-            worst.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
-            let total: f64 = worst.iter().map(|w| w.0 * w.0).sum();
-            let mut sum = 0.0;
-            for (k, (d, i)) in worst.iter().enumerate() {
-                sum += d * d;
-                if k < 8 || k == 15 || k == 31 || k == 63 {
-                    println!(
-                        "    {k} {:.2} {d:+.4} of {:.4} direct {:.4} at {} n {}",
-                        sum / total,
-                        goal.irradiance[*i].y,
-                        goal.direct[*i].y,
-                        goal.mesh.patches[*i].piece.center(),
-                        goal.mesh.patches[*i].piece.normal()
-                    );
-                }
-            }
         }
     }
 }
