@@ -98,6 +98,12 @@ pub struct SolveSpec {
     pub min_size: Option<f64>,
     /// Greatest error of a link of the hierarchical solver: the error of its receiver's irradiance as a share of
     /// the irradiance that is usual there, times the receiver's share of the area of all surfaces.
+    ///
+    /// All links together err by no more than `links` (see [`Report`]) times this, as a share of the irradiance in
+    /// the mean over all surfaces; by far less where their signs differ. Against the direct solution of five rooms
+    /// (tests/radiosity_accuracy; root mean square of irradiance on squares of an eighth of a wall, as a share of the
+    /// mean irradiance, and error of the mean itself): 7 to 23 % and 5 % at 1e-3, 4 to 7 % and 0.6 % at 1e-4, 2 to 5 %
+    /// and 0.9 % at 1e-5. Shadows err most; where `min_size` stops the division, smaller errors bring nothing more.
     pub error: f64,
     /// The iteration ends when the residual, relative to the emitted power, is less.
     pub residual: f64,
