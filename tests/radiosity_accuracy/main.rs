@@ -35,6 +35,7 @@ fn hierarchical(scene: &Scene, error: f64, min_size: f64) -> Solution {
         &SolveSpec {
             error,
             min_size: Some(min_size),
+            walks: std::env::var("WALKS").map_or(1 << 20, |s| s.parse().unwrap()),
             residual: 1e-6,
             ..SolveSpec::default()
         },

@@ -23,9 +23,7 @@ pub fn correct(
     report: &mut Report,
 ) -> Vec<Rgb64> {
     let (mesh, numbers) = output::mesh(tree);
-    let clock = std::time::Instant::now();
     let walks = Walks::new(scene, tree, (&mesh, numbers.leaf), field, spec);
-    eprintln!("walked {}", clock.elapsed().as_secs_f64());
     let emitted = tree.emitted_power().element_sum();
     for node in &mut tree.nodes {
         node.gain = Gain::NONE;
@@ -52,7 +50,6 @@ pub fn correct(
             if let Some(edges) = spec.max_edges.filter(|&e| u64::from(e) <= step) {
                 reflected = edge_by_edge(tree, parts, &direct, edges);
             }
-            eprintln!("steps {step}");
             break;
         }
     }

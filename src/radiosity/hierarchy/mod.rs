@@ -92,7 +92,7 @@ pub fn solve(
     let emitted = tree.emitted_power();
     let mut field = Field::new(&tree);
     let most = spec.max_steps.unwrap_or(MAX_STEPS);
-    let mut balanced = balance::Balanced::default();
+    let mut too_much = 0.0;
     let mut parts = Parts::new(&tree);
     let looser = (LOOSEST / spec.error).log(STEP).floor() as i32;
     for looser in (0..=looser.clamp(0, LOOSER)).rev() {
@@ -101,21 +101,13 @@ pub fn solve(
         // What few links make dark may be brighter than it seems.
         let black = (BLACK * STEP.powi(looser)).min(0.25);
         refiner.refine(&mut tree, &mut field, error, black);
-        let closed = balance::closed(scene, &tree, &field, spec.seed);
-        if closed == Some(1.0) && balance::absorbs_nothing(&tree) {
+        if balance::keeps_all(scene, &tree, &field, spec.seed) {
             return Err(SolveError::NoAbsorption);
         }
         parts = Parts::new(&tree);
-        balanced = balance::balance(&mut tree, &parts, closed);
+        too_much = balance::balance(&mut tree, &parts);
         field.prepare(&tree, &parts);
         report.form_factor_seconds += clock.elapsed().as_secs_f64();
-        eprintln!(
-            "refined {looser} patches {} nodes {} links {} {}",
-            tree.patches,
-            tree.nodes.len(),
-            tree.links(),
-            start.elapsed().as_secs_f64()
-        );
         let clock = Instant::now();
         // Before the last refinement, it is enough to see where light goes.
         let (wanted, until) = match looser {
@@ -134,11 +126,6 @@ pub fn solve(
         }
         field.spread(&tree, &parts);
         report.solve_seconds += clock.elapsed().as_secs_f64();
-        eprintln!(
-            "solved {looser} {} steps {}",
-            start.elapsed().as_secs_f64(),
-            report.steps
-        );
         if looser == 0 || report.steps >= most {
             break;
         }
@@ -160,18 +147,15 @@ pub fn solve(
         ));
         report.solve_seconds += clock.elapsed().as_secs_f64();
     }
-    if balanced.mean > MUCH {
-        let to = if balanced.closed { "to" } else { "down to" };
+    if too_much > MUCH && spec.walks == 0 {
         report.warnings.push(format!(
-            "the form factors of patches were scaled {to} a sum of 1, by {:.0} % in the mean: surfaces that coincide or \
-             let light through, or links that are too coarse",
-            100.0 * balanced.mean
+            "the form factors of patches were scaled down to a sum of 1, by {:.0} % in the mean: surfaces that coincide \
+             or let light through, or links that are too coarse",
+            100.0 * too_much
         ));
     }
-    eprintln!("corrected {}", start.elapsed().as_secs_f64());
     let direct = direct.unwrap_or_else(|| correct::straight(&tree, &parts));
     let solution = output::solution(scene, &tree, &field, &direct, report);
-    eprintln!("output {}", start.elapsed().as_secs_f64());
     if solution.mesh.is_empty() {
         return Err(SolveError::NoPatches);
     }

@@ -162,13 +162,8 @@ impl<'a> Solving<'a> {
     pub fn of(scene: &'a Scene, cache: &'a CacheSpec, path: &PathSpec) -> Solving<'a> {
         let made_for = match cache.indirect {
             Indirect::Guide => Use::Guide,
-            Indirect::None | Indirect::Gather => {
-                if std::env::var("FLAT").is_ok() {
-                    Use::Flat
-                } else {
-                    Use::Smooth
-                }
-            }
+            // A final gather sees no single patch.
+            Indirect::None | Indirect::Gather => Use::Flat,
         };
         // From the eye to where it is read, by the shortest way, a path has two edges.
         let max_edges = path.max_depth.map(|depth| depth.saturating_sub(2).max(1));
@@ -212,9 +207,7 @@ impl<'a> Solving<'a> {
                 Err(error) => return Err(error),
             },
         };
-        let clock = Instant::now();
         let cache = Cache::new(solution, self.scene, self.made_for);
-        eprintln!("cache {}", clock.elapsed().as_secs_f64());
         // Without links, nothing to be guided by.
         Ok((self.made_for != Use::Guide || cache.guide.is_some()).then_some(cache))
     }
