@@ -12,6 +12,9 @@ use rayon::prelude::*;
 /// Steps in which the light of links and its gains settle, at most.
 const STEPS: u64 = 200;
 
+/// Steps after which it is settled how far walks are trusted.
+const SEEN: u64 = 3;
+
 /// Solves again, with what links bring to patches corrected by walks (see [`super::walks`]): light straight from
 /// emitters first, then what is reflected. Gives irradiance straight from emitters, by node.
 pub fn correct(
@@ -34,11 +37,15 @@ pub fn correct(
     let irradiance = std::mem::take(&mut field.irradiance);
     let mut reflected = Field::reflected(tree, direct.clone(), irradiance);
     reflected.prepare(tree, parts);
+    let mut prior = None;
     let most = spec.max_steps.unwrap_or(STEPS).min(STEPS);
     for step in 1..=most {
         let linked = reflected.gather(tree, parts);
         let [by_links, irradiance] = by_patch(tree, parts, &reflected, &walks, &met, &linked);
-        let gains = walks.gains(tree, &order, &walks.arriving(&irradiance), &by_links);
+        let arriving = walks.arriving(&irradiance);
+        let known = prior.filter(|_| step > SEEN);
+        let (gains, used) = walks.gains(tree, &order, &arriving, &by_links, known);
+        prior = Some(used);
         for (&node, gain) in order.nodes.iter().zip(gains) {
             tree.nodes[node as usize].gain = gain;
         }
@@ -85,7 +92,7 @@ fn corrected(tree: &Tree, parts: &Parts, walks: &Walks) -> Vec<Rgb64> {
         .iter()
         .map(|&leaf| direct[leaf as usize])
         .collect();
-    let gains = walks.gains(tree, &order, &walks.direct, &linked);
+    let (gains, _) = walks.gains(tree, &order, &walks.direct, &linked, None);
     for &leaf in &walks.leaf {
         let gain = gains[order.number[leaf as usize] as usize];
         direct[leaf as usize] = gain.of(direct[leaf as usize]);

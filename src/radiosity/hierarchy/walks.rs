@@ -27,15 +27,13 @@ use rayon::prelude::*;
 const LONGEST: u32 = 32;
 /// Mirrors, glass and gloss in a row, at most.
 const PASSES: u32 = 8;
-/// Edges that weigh as much as what is known of the surroundings already.
-const PRIOR: f64 = 256.0;
 
 /// Points that walks left from, and what arrives there.
 pub struct Walks {
     /// By patch: how many points it has.
     visits: Vec<u32>,
     /// By patch: irradiance straight from emitters, summed over its points, in W/m².
-    pub direct: Vec<Rgb64>,
+    pub direct: Arrived,
     /// The same from emitters by mirrors, glass and gloss.
     stray: Vec<Rgb64>,
     /// What edges found; those from patch i are `first[i]..first[i + 1]`.
@@ -43,6 +41,14 @@ pub struct Walks {
     first: Vec<u32>,
     /// By patch: its node.
     pub leaf: Vec<u32>,
+}
+
+/// What came to the points that walks left from, by patch.
+pub struct Arrived {
+    /// Irradiance summed over the points, in W/m².
+    pub sum: Vec<Rgb64>,
+    /// The square of the sum of its channels, summed over all points.
+    pub squares: f64,
 }
 
 /// An edge brings `weight` times the irradiance of patch `to`.
@@ -86,8 +92,11 @@ impl Walks {
         }
         let mut visits = vec![0; leaf.len()];
         let mut terms = Vec::new();
-        let mut direct = vec![Rgb64::ZERO; leaf.len()];
-        let mut stray = direct.clone();
+        let mut stray = vec![Rgb64::ZERO; leaf.len()];
+        let mut direct = Arrived {
+            sum: stray.clone(),
+            squares: 0.0,
+        };
         let (mut made, mut number) = (0, 0);
         // Rounds, until there are enough edges.
         let round = edges.div_ceil(u64::from(LONGEST)).max(1);
@@ -119,7 +128,9 @@ impl Walks {
                 for visit in &walk.visits {
                     let patch = visit.patch as usize;
                     visits[patch] += 1;
-                    direct[patch] += rgb64(visit.direct);
+                    let lit = rgb64(visit.direct);
+                    direct.sum[patch] += lit;
+                    direct.squares += lit.element_sum().powi(2);
                     stray[patch] += rgb64(visit.stray);
                 }
                 made += walk.visits.len() as u64;
@@ -152,39 +163,41 @@ impl Walks {
         patches.filter(|i| met[*i as usize]).collect()
     }
 
-    /// What arrives at the points that walks left from, summed by patch, if patches have `irradiance` (by patch).
-    pub fn arriving(&self, irradiance: &[Rgb64]) -> Vec<Rgb64> {
+    /// What arrives if patches have `irradiance` (by patch).
+    pub fn arriving(&self, irradiance: &[Rgb64]) -> Arrived {
         let of = |patch: usize| {
             let range = self.first[patch] as usize..self.first[patch + 1] as usize;
-            let term =
-                |t: &Term| Rgb64::from_array(t.weight.map(f64::from)) * irradiance[t.to as usize];
-            self.terms[range]
-                .iter()
-                .map(term)
-                .fold(self.stray[patch], |a, b| a + b)
+            let (mut sum, mut squares) = (self.stray[patch], 0.0);
+            for t in &self.terms[range] {
+                let e = Rgb64::from_array(t.weight.map(f64::from)) * irradiance[t.to as usize];
+                sum += e;
+                squares += e.element_sum().powi(2);
+            }
+            (sum, squares)
         };
-        (0..self.leaf.len()).into_par_iter().map(of).collect()
+        let found: Vec<(Rgb64, f64)> = (0..self.leaf.len()).into_par_iter().map(of).collect();
+        Arrived {
+            squares: found.iter().map(|f| f.1).sum(),
+            sum: found.into_iter().map(|f| f.0).collect(),
+        }
     }
 
-    /// What makes of `linked`, what links bring to patches, what `arrived` at the points that walks left from (both
-    /// by patch, the latter summed over its points): by node of `order`.
+    /// What makes of `linked`, what links bring to patches (by patch), what `arrived`: by node of `order`. What is
+    /// known of the node above weighs as much as `prior` points; `None`: as many as the gains themselves tell.
     pub fn gains(
         &self,
         tree: &Tree,
         order: &Order,
-        arrived: &[Rgb64],
+        arrived: &Arrived,
         linked: &[Rgb64],
-    ) -> Vec<Gain> {
+        prior: Option<f64>,
+    ) -> (Vec<Gain>, f64) {
         let mut sums = vec![Sums::default(); order.nodes.len()];
-        for (patch, &arrived) in arrived
-            .iter()
-            .enumerate()
-            .filter(|(i, _)| self.visits[*i] > 0)
-        {
-            let n = f64::from(self.visits[patch]);
+        for (patch, &visits) in self.visits.iter().enumerate().filter(|(_, n)| **n > 0) {
+            let n = f64::from(visits);
             sums[order.number[self.leaf[patch] as usize] as usize].add(&Sums {
                 n,
-                arrived,
+                arrived: arrived.sum[patch],
                 linked: linked[patch] * n,
             });
         }
@@ -199,12 +212,54 @@ impl Walks {
                 sums[above].add(&below);
             }
         }
+        let prior = prior.unwrap_or_else(|| {
+            let with_parent = |i: usize| Some((&sums[i], &sums[above(i)?]));
+            let pairs = (0..sums.len()).filter_map(with_parent);
+            points_of_prior(sums.first(), arrived.squares, pairs)
+        });
         let mut out: Vec<Gain> = Vec::with_capacity(sums.len());
         for (i, sums) in sums.iter().enumerate() {
             let above = above(i).map_or(Gain::NONE, |above| out[above]);
-            out.push(sums.gain(&above));
+            out.push(sums.gain(&above, prior));
         }
-        out
+        (out, prior)
+    }
+}
+
+/// How many points tell as much as the node above: the variance of one point over that of gains around the gain of
+/// the node above, both relative; of gains by the method of moments (DerSimonian & Laird 1986), from all nodes below
+/// `root` and what they are in. So good links stay what they are, and bad ones follow the walks.
+fn points_of_prior<'a>(
+    root: Option<&Sums>,
+    squares: f64,
+    nodes: impl Iterator<Item = (&'a Sums, &'a Sums)>,
+) -> f64 {
+    /// Bounds where chance rules.
+    const FEWEST: f64 = 16.0;
+    const MOST: f64 = 1e6;
+    let Some(root) = root.filter(|root| root.n > 0.0) else {
+        return MOST;
+    };
+    let mean = root.arrived.element_sum() / root.n;
+    let variance = squares / root.n / (mean * mean) - 1.0;
+    if !(variance.is_finite() && variance > 0.0) {
+        return MOST;
+    }
+    let (mut excess, mut weights) = (0.0, 0.0);
+    for (node, above) in nodes.filter(|(node, _)| node.n > 0.0) {
+        let expected =
+            node.linked.element_sum() * above.arrived.element_sum() / above.linked.element_sum();
+        let deviation = node.arrived.element_sum() / expected - 1.0;
+        // Of what is hardly linked, gains say nothing; one far off does not rule over all.
+        if deviation.is_finite() {
+            let weight = node.n / variance;
+            excess += (weight * deviation.clamp(-1.0, 1.0).powi(2)) - 1.0;
+            weights += weight;
+        }
+    }
+    match excess > 0.0 {
+        true => (variance * weights / excess).clamp(FEWEST, MOST),
+        false => MOST,
     }
 }
 
@@ -255,13 +310,13 @@ impl Sums {
     }
 
     /// What was found here, and what is known of the node above, by what they are worth.
-    fn gain(&self, above: &Gain) -> Gain {
+    fn gain(&self, above: &Gain, prior: f64) -> Gain {
         /// By how much links may be scaled up; what is still missing is added, the same everywhere.
         const MOST: f64 = 4.0;
         if self.n <= 0.0 {
             return *above;
         }
-        let share = PRIOR / self.n;
+        let share = prior / self.n;
         let arrived = self.arrived + (self.linked * above.scale + above.more * self.n) * share;
         let linked = self.linked * (1.0 + share);
         let of = |c: usize| {
