@@ -100,10 +100,10 @@ pub struct SolveSpec {
     /// the irradiance that is usual there, times the receiver's share of the area of all surfaces.
     ///
     /// All links together err by no more than `links` (see [`Report`]) times this, as a share of the irradiance in
-    /// the mean over all surfaces; by far less where their signs differ. Against the direct solution of five rooms
-    /// (tests/radiosity_accuracy; root mean square of irradiance on squares of an eighth of a wall, as a share of the
-    /// mean irradiance, and error of the mean itself): 7 to 23 % and 5 % at 1e-3, 4 to 7 % and 0.6 % at 1e-4, 2 to 5 %
-    /// and 0.9 % at 1e-5. Shadows err most; where `min_size` stops the division, smaller errors bring nothing more.
+    /// the mean over all surfaces; by far less where their signs differ, and where walks put them right. Against the
+    /// direct solution of five rooms (tests/radiosity_accuracy; root mean square of irradiance on squares of an eighth
+    /// of a wall, as a share of the mean irradiance): 1 to 10 % at 1e-3, 0.5 to 1 % at 1e-4 and at 1e-5; without walks
+    /// 6 to 23 %, 3 to 8 %, 0.4 to 6 %. Where `min_size` stops the division, smaller errors bring nothing more.
     pub error: f64,
     /// The iteration ends when the residual, relative to the emitted power, is less.
     pub residual: f64,
@@ -111,7 +111,8 @@ pub struct SolveSpec {
     pub max_steps: Option<u64>,
     /// Show light that is not shot yet as if it were spread everywhere (shooting only; display, not result).
     pub ambient: bool,
-    /// Edges of random walks by which the hierarchical solver corrects what links bring, about; 0: it trusts them.
+    /// Edges of random walks by which the hierarchical solver corrects what links bring, about; 0: it trusts them. The
+    /// noise of the corrected light falls with their square root; how far links need it is found by the walks too.
     pub walks: u64,
     /// Light at patches has at most so many edges, from its emitter on; `None`: any number (hierarchical solver with
     /// walks only).

@@ -12,11 +12,11 @@
 
 use super::bodies::Parts;
 use super::gather::Field;
-use super::tree::{Gain, Kind, NONE, Tree};
+use super::tree::{Gain, NONE, Tree};
 use crate::bsdf::{Bsdf, Mode};
 use crate::geom::Hit;
 use crate::math::{DVec2, Frame, PI, Rgb, Vec2, Vec3, warp};
-use crate::radiosity::mesh::on_facet;
+use crate::radiosity::mesh::{Patch, on_facet};
 use crate::radiosity::optics::rgb64;
 use crate::radiosity::{Gloss, PatchMesh, Rgb64, SolveSpec};
 use crate::sampler::{Sampler, SamplerKind};
@@ -74,8 +74,8 @@ struct Visit {
 }
 
 impl Walks {
-    /// About `edges` edges; fewer where they leave the scene soon. Walks start where the light of `field` leaves
-    /// patches, and go on with equal chances, however dark a surface is.
+    /// About as many edges as asked for; fewer where they leave the scene soon. Walks start where the light of `field`
+    /// leaves patches, and go on with equal chances, however dark a surface is.
     pub fn new(
         scene: &Scene,
         tree: &Tree,
@@ -83,71 +83,71 @@ impl Walks {
         field: &Field,
         spec: &SolveSpec,
     ) -> Walks {
-        let (edges, seed) = (spec.walks, spec.seed);
         let mut sums = Vec::with_capacity(leaf.len());
         let mut sum = 0.0;
         for (patch, &node) in mesh.patches.iter().zip(&leaf) {
             sum += (field.radiosity[node as usize].element_sum() * patch.area).max(0.0);
             sums.push(sum);
         }
-        let mut visits = vec![0; leaf.len()];
-        let mut terms = Vec::new();
-        let mut stray = vec![Rgb64::ZERO; leaf.len()];
-        let mut direct = Arrived {
-            sum: stray.clone(),
-            squares: 0.0,
+        let mut walks = Walks {
+            visits: vec![0; leaf.len()],
+            direct: Arrived {
+                sum: vec![Rgb64::ZERO; leaf.len()],
+                squares: 0.0,
+            },
+            stray: vec![Rgb64::ZERO; leaf.len()],
+            terms: Vec::new(),
+            first: Vec::new(),
+            leaf,
         };
-        let (mut made, mut number) = (0, 0);
-        // Rounds, until there are enough edges.
-        let round = edges.div_ceil(u64::from(LONGEST)).max(1);
-        const ROUNDS: u64 = LONGEST as u64;
-        while sum.is_finite() && sum > 0.0 && made < edges && number < round * ROUNDS {
-            let walk = |i: u64| {
-                let sampler = Sampler::new(SamplerKind::Sobol, seed, u64::MAX - 1, i, 1);
-                let [x, y, pick, _] = sampler.get4(0);
-                let at = f64::from(pick) * sum;
-                let patch = sums.partition_point(|s| *s <= at).min(sums.len() - 1);
-                let Kind::Surface { facet, piece } = tree.nodes[leaf[patch] as usize].kind else {
-                    return Walk::default();
-                };
-                let st = piece.outline.sample(DVec2::new(f64::from(x), f64::from(y)));
-                let hit = on_facet(scene, &tree.surfaces, facet, &piece, st);
-                let walker = Walker {
-                    scene,
-                    mesh,
-                    gloss: spec.gloss,
-                    sampler,
-                    blocks: 0,
-                    walk: Walk::default(),
-                };
-                walker.walk(patch as u32, hit)
+        let walk = |i: u64| {
+            let sampler = Sampler::new(SamplerKind::Sobol, spec.seed, u64::MAX - 1, i, 1);
+            let [x, y, pick, _] = sampler.get4(0);
+            let at = f64::from(pick) * sum;
+            let patch = sums.partition_point(|s| *s <= at).min(sums.len() - 1);
+            let Patch { piece, facet, .. } = mesh.patches[patch];
+            let st = piece.outline.sample(DVec2::new(f64::from(x), f64::from(y)));
+            let hit = on_facet(scene, &tree.surfaces, facet, &piece, st);
+            let walker = Walker {
+                scene,
+                mesh,
+                gloss: spec.gloss,
+                sampler,
+                blocks: 0,
+                walk: Walk::default(),
             };
+            walker.walk(patch as u32, hit)
+        };
+        // Rounds, until there are enough edges.
+        let round = spec.walks.div_ceil(u64::from(LONGEST));
+        let (mut made, mut number) = (0, 0);
+        while sum.is_finite() && sum > 0.0 && made < spec.walks && number < spec.walks {
             let found: Vec<Walk> = (number..number + round).into_par_iter().map(walk).collect();
             number += round;
-            for walk in found {
-                for visit in &walk.visits {
-                    let patch = visit.patch as usize;
-                    visits[patch] += 1;
-                    let lit = rgb64(visit.direct);
-                    direct.sum[patch] += lit;
-                    direct.squares += lit.element_sum().powi(2);
-                    stray[patch] += rgb64(visit.stray);
-                }
-                made += walk.visits.len() as u64;
-                terms.extend(walk.terms);
+            made += walks.add(found);
+        }
+        walks.terms.par_sort_by_key(|t| t.from);
+        let start = |i: u32| walks.terms.partition_point(|t| t.from < i) as u32;
+        walks.first = (0..=mesh.len() as u32).into_par_iter().map(start).collect();
+        walks
+    }
+
+    /// Gives how many edges that are.
+    fn add(&mut self, found: Vec<Walk>) -> u64 {
+        let mut edges = 0;
+        for walk in found {
+            for visit in &walk.visits {
+                let patch = visit.patch as usize;
+                self.visits[patch] += 1;
+                let direct = rgb64(visit.direct);
+                self.direct.sum[patch] += direct;
+                self.direct.squares += direct.element_sum().powi(2);
+                self.stray[patch] += rgb64(visit.stray);
             }
+            edges += walk.visits.len() as u64;
+            self.terms.extend(walk.terms);
         }
-        terms.par_sort_by_key(|t| t.from);
-        let start = |i: u32| terms.partition_point(|t| t.from < i) as u32;
-        let first = (0..=mesh.len() as u32).into_par_iter().map(start).collect();
-        Walks {
-            visits,
-            direct,
-            stray,
-            terms,
-            first,
-            leaf,
-        }
+        edges
     }
 
     /// Patches that walks met.
@@ -226,6 +226,11 @@ impl Walks {
     }
 }
 
+/// Variance over squared mean, of `n` numbers.
+fn relative_variance(sum: f64, squares: f64, n: f64) -> f64 {
+    squares * n / (sum * sum) - 1.0
+}
+
 /// How many points tell as much as the node above: the variance of one point over that of gains around the gain of
 /// the node above, both relative; of gains by the method of moments (DerSimonian & Laird 1986), from all nodes below
 /// `root` and what they are in. So good links stay what they are, and bad ones follow the walks.
@@ -240,8 +245,7 @@ fn points_of_prior<'a>(
     let Some(root) = root.filter(|root| root.n > 0.0) else {
         return MOST;
     };
-    let mean = root.arrived.element_sum() / root.n;
-    let variance = squares / root.n / (mean * mean) - 1.0;
+    let variance = relative_variance(root.arrived.element_sum(), squares, root.n);
     if !(variance.is_finite() && variance > 0.0) {
         return MOST;
     }
@@ -411,7 +415,7 @@ impl Walker<'_> {
                 break;
             };
             bent |= !straight;
-            throughput = throughput * sample.weight;
+            throughput *= sample.weight;
             wi = sample.wi;
         }
         let counts = self.gloss == Gloss::All && stray.is_finite();

@@ -79,8 +79,8 @@ impl Default for CacheSpec {
 
 /// Error of a link that is good enough behind a final gather, where walks put links right.
 const GATHER_ERROR: f64 = 1e-2;
-/// Edges of these walks.
-const CACHE_WALKS: u64 = 1 << 18;
+/// Edges of these walks: what is read is averaged over many patches.
+const CACHE_WALKS: u64 = 1 << 19;
 /// Share of the light that may still be under way in a cache.
 const CACHE_RESIDUAL: f64 = 1e-3;
 

@@ -44,6 +44,7 @@ pub fn solve(props: &Props, defaults: SolveSpec) -> Result<SolveSpec, SceneError
             }
         }
     }
+    let walks = u64::try_from(props.int("walks")?).ok();
     let max_steps = u64::try_from(props.int("max_steps")?).ok();
     Ok(SolveSpec {
         solver,
@@ -51,7 +52,7 @@ pub fn solve(props: &Props, defaults: SolveSpec) -> Result<SolveSpec, SceneError
         patch_size: optional("patch_size")?,
         min_size: optional("min_size")?,
         error: optional("error")?.unwrap_or(defaults.error),
-        walks: u64::try_from(props.int("walks")?).unwrap_or(defaults.walks),
+        walks: walks.unwrap_or(defaults.walks),
         residual: props.float("residual")?,
         max_steps,
         curve_error: props.float("curve_error")?,
