@@ -14,6 +14,9 @@ const ROOMS: [&str; 3] = [
 
 /// With an albedo of 0.999 it takes 9,200 steps, each of which lets through that much.
 const RESIDUAL: f64 = 1e-4;
+/// In the mean over the area: of light straight from emitters, which is everywhere here, by links of an error of 1e-2
+/// and by walks of which a patch has some hundreds. What is reflected errs no more, however often that happens.
+const NOISE: f64 = 5e-3;
 
 #[test]
 fn links_keep_the_light_of_bright_furnaces() {
@@ -35,11 +38,14 @@ fn links_keep_the_light_of_bright_furnaces() {
             assert!(solution.report.converged);
             // The scene is held in f32.
             let expected = std::f64::consts::PI / (1.0 - f64::from(albedo as f32));
-            for b in &solution.radiosity {
-                // The light that is still under way is this share of all; links do not matter, whose sums are scaled.
+            let mut sums = [0.0; 2];
+            for (patch, b) in solution.mesh.patches.iter().zip(&solution.radiosity) {
                 let off = (*b / expected - 1.0).abs().max_element();
-                assert!(off < 1.1 * RESIDUAL, "{albedo}: {b}, not {expected}");
+                sums[0] += patch.area * off;
+                sums[1] += patch.area;
             }
+            let off = sums[0] / sums[1];
+            assert!(off < NOISE + RESIDUAL, "{albedo}: off by {off}");
         }
     }
 }

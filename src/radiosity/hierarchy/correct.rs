@@ -9,11 +9,10 @@ use crate::radiosity::{Report, Rgb64, SolveSpec};
 use crate::scene::Scene;
 use rayon::prelude::*;
 
-/// Steps in which the light of links and its gains settle, at most.
-const STEPS: u64 = 200;
-
-/// Steps after which it is settled how far walks are trusted.
-const SEEN: u64 = 3;
+/// Steps that all look at the gains; how far walks are trusted is settled then.
+const OFTEN: u64 = 8;
+/// Of those after, one in so many does.
+const SELDOM: u64 = 32;
 
 /// Solves again, with what links bring to patches corrected by walks (see [`super::walks`]): light straight from
 /// emitters first, then what is reflected. Gives irradiance straight from emitters, by node.
@@ -37,22 +36,26 @@ pub fn correct(
     let irradiance = std::mem::take(&mut field.irradiance);
     let mut reflected = Field::reflected(tree, direct.clone(), irradiance);
     reflected.prepare(tree, parts);
-    let mut prior = None;
-    let most = spec.max_steps.unwrap_or(STEPS).min(STEPS);
-    for step in 1..=most {
+    let (mut prior, mut settled) = (None, false);
+    for step in 1..=spec.max_steps.unwrap_or(super::MAX_STEPS) {
         let linked = reflected.gather(tree, parts);
-        let [by_links, irradiance] = by_patch(tree, parts, &reflected, &walks, &met, &linked);
-        let arriving = walks.arriving(&irradiance);
-        let known = prior.filter(|_| step > SEEN);
-        let (gains, used) = walks.gains(tree, &order, &arriving, &by_links, known);
-        prior = Some(used);
-        for (&node, gain) in order.nodes.iter().zip(gains) {
-            tree.nodes[node as usize].gain = gain;
+        // Bright rooms take many steps, of which gains need few.
+        let looks = settled || step <= OFTEN || step % SELDOM == 0;
+        if looks {
+            let [by_links, irradiance] = by_patch(tree, parts, &reflected, &walks, &met, &linked);
+            let arriving = walks.arriving(&irradiance);
+            let known = prior.filter(|_| step > OFTEN);
+            let (gains, used) = walks.gains(tree, &order, &arriving, &by_links, known);
+            prior = Some(used);
+            for (&node, gain) in order.nodes.iter().zip(gains) {
+                tree.nodes[node as usize].gain = gain;
+            }
         }
         let change = reflected.apply(tree, parts, &linked);
         report.steps += 1;
         report.residual = change / emitted.max(f64::MIN_POSITIVE);
-        report.converged = report.residual <= spec.residual;
+        settled = report.residual <= spec.residual;
+        report.converged = settled && looks;
         if report.converged || !report.residual.is_finite() {
             if let Some(edges) = spec.max_edges.filter(|&e| u64::from(e) <= step) {
                 reflected = edge_by_edge(tree, parts, &direct, edges);

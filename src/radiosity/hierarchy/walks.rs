@@ -13,7 +13,7 @@
 use super::bodies::Parts;
 use super::gather::Field;
 use super::tree::{Gain, NONE, Tree};
-use crate::bsdf::{Bsdf, Mode};
+use crate::bsdf::{Bsdf, Density, Mode};
 use crate::geom::Hit;
 use crate::math::{DVec2, Frame, PI, Rgb, Vec2, Vec3, warp};
 use crate::radiosity::mesh::{Patch, on_facet};
@@ -356,14 +356,14 @@ impl Walker<'_> {
     /// From `hit` on patch `from`.
     fn walk(mut self, mut from: u32, mut hit: Hit) -> Walk {
         for _ in 0..LONGEST {
-            let direct = lit_straight(self.scene, &hit, self.numbers());
+            let sampled = lit_straight(self.scene, &hit, self.numbers());
             let [u, v, ..] = self.numbers();
             let wi = direction(&hit, Vec2::new(u, v));
-            let (stray, next) = self.follow(from, hit, wi);
+            let (shown, next) = self.follow(from, hit, wi);
             self.walk.visits.push(Visit {
                 patch: from,
-                direct,
-                stray,
+                direct: sampled + shown.straight,
+                stray: shown.stray,
             });
             match next {
                 Some(next) => (from, hit) = next,
@@ -373,22 +373,36 @@ impl Walker<'_> {
         self.walk
     }
 
-    /// Looks along `wi` from `hit` on patch `from`, by what mirrors and glass show: gives irradiance by the emitters
-    /// that these show, and the first diffuse surface.
-    fn follow(&mut self, from: u32, mut hit: Hit, mut wi: Vec3) -> (Rgb, Option<(u32, Hit)>) {
-        let mut next = None;
-        let (mut throughput, mut stray, mut bent) = (Rgb::WHITE, Rgb::BLACK, false);
+    /// Looks along `wi` from `hit` on patch `from`, by what mirrors and glass show: gives the emitters that are seen, and
+    /// the first diffuse surface.
+    fn follow(&mut self, from: u32, mut hit: Hit, mut wi: Vec3) -> (Shown, Option<(u32, Hit)>) {
+        let (origin, density) = (hit, Density::PerSr(front(&hit).dot(wi) / PI));
+        let (mut next, mut shown) = (None, Shown::default());
+        let (mut throughput, mut bent) = (Rgb::WHITE, false);
         for _ in 0..PASSES {
-            let Some(met) = self.scene.intersect(&hit.spawn(wi)) else {
-                if bent {
-                    stray += throughput * self.scene.le_escaped(wi) * PI;
+            let met = self.scene.intersect(&hit.spawn(wi));
+            let le = match &met {
+                Some(met) => self.scene.le(met),
+                None => self.scene.le_escaped(wi),
+            };
+            if !le.is_black() {
+                let lit = throughput * le * PI;
+                match (bent, &met) {
+                    (true, _) => shown.stray += lit,
+                    (false, Some(met)) => {
+                        let rival = self.scene.pdf_light(&origin, met);
+                        shown.straight += lit * density.mis_weight(rival);
+                    }
+                    (false, None) => {
+                        let rival = self.scene.pdf_light_escaped(&origin, wi);
+                        shown.straight += lit * density.mis_weight(rival);
+                    }
                 }
+            }
+            let Some(met) = met else {
                 break;
             };
             hit = met;
-            if bent {
-                stray += throughput * self.scene.le(&hit) * PI;
-            }
             let [u, v, lobe, mixed] = self.numbers();
             let shading = self.scene.shade(&hit, mixed);
             let diffuse = shading.diffuse_share();
@@ -418,12 +432,22 @@ impl Walker<'_> {
             throughput *= sample.weight;
             wi = sample.wi;
         }
-        let counts = self.gloss == Gloss::All && stray.is_finite();
-        (if counts { stray } else { Rgb::BLACK }, next)
+        if self.gloss != Gloss::All || !shown.stray.is_finite() {
+            shown.stray = Rgb::BLACK;
+        }
+        (shown, next)
     }
 }
 
-/// One sample of the irradiance at `hit` straight from emitters, in W/m².
+/// Irradiance in W/m² by the emitters that an edge sees: straight, where these cannot be sampled as well, and by
+/// mirrors, glass and gloss.
+#[derive(Default)]
+struct Shown {
+    straight: Rgb,
+    stray: Rgb,
+}
+
+/// One sample of the irradiance at `hit` straight from emitters, in W/m², where edges do not see them as well.
 fn lit_straight(scene: &Scene, hit: &Hit, [u, v, pick, _]: [f32; 4]) -> Rgb {
     let Some(sample) = scene.sample_light(hit, pick, Vec2::new(u, v)) else {
         return Rgb::BLACK;
@@ -433,7 +457,7 @@ fn lit_straight(scene: &Scene, hit: &Hit, [u, v, pick, _]: [f32; 4]) -> Rgb {
         return Rgb::BLACK;
     }
     let passes = scene.transmittance(&sample.shadow_ray(hit), PASSES);
-    let lit = weight * (cos * passes);
+    let lit = weight * (cos * passes * sample.density.mis_weight(cos / PI));
     if lit.is_finite() { lit } else { Rgb::BLACK }
 }
 
