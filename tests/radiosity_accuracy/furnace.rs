@@ -17,6 +17,8 @@ const RESIDUAL: f64 = 1e-4;
 /// In the mean over the area: of light straight from emitters, which is everywhere here, by links of an error of 1e-2
 /// and by walks of which a patch has some hundreds. What is reflected errs no more, however often that happens.
 const NOISE: f64 = 5e-3;
+/// Share of rays that may slip out between two surfaces: six of a million did.
+const LOST: f64 = 1e-5;
 
 #[test]
 fn links_keep_the_light_of_bright_furnaces() {
@@ -45,7 +47,10 @@ fn links_keep_the_light_of_bright_furnaces() {
                 sums[1] += patch.area;
             }
             let off = sums[0] / sums[1];
-            assert!(off < NOISE + RESIDUAL, "{albedo}: off by {off}");
+            assert!(
+                off < NOISE + RESIDUAL + LOST / (1.0 - albedo),
+                "{albedo}: off by {off}"
+            );
         }
     }
 }
