@@ -26,6 +26,29 @@ fn scene() -> Scene {
         .scene
 }
 
+/// Links and solving together: what refinement does depends on the light that there is.
+fn hierarchical(criterion: &mut Criterion, scene: &Scene) {
+    let mut group = criterion.benchmark_group("hierarchical radiosity");
+    for error in [1e-3, 1e-4] {
+        let spec = SolveSpec {
+            error,
+            ..SolveSpec::default()
+        };
+        let solve = || radiosity::solve(scene, &spec, &mut |_| ControlFlow::Continue(())).unwrap();
+        let r = solve().report;
+        println!(
+            "error {error:e}: {} patches, {} links, {:.0} links/s, solving {:.4} s in {} steps",
+            r.patches,
+            r.links,
+            r.links as f64 / r.form_factor_seconds,
+            r.solve_seconds,
+            r.steps
+        );
+        group.bench_function(BenchmarkId::from_parameter(error), |b| b.iter(&solve));
+    }
+    group.finish();
+}
+
 fn main() {
     let mut criterion = Criterion::default()
         .sample_size(10)
@@ -67,5 +90,6 @@ fn main() {
         }
         group.finish();
     }
+    hierarchical(&mut criterion, &scene);
     criterion.final_summary();
 }

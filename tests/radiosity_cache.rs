@@ -281,6 +281,8 @@ fn threads_do_not_change_the_picture() {
         shown(Show::Gouraud, None),
         shown(Show::Gather, None),
     ] {
+        let mut integrator = integrator;
+        integrator.solve().unwrap().walks = 1 << 14;
         let mut compiled = compile(&room(&(LAMP.to_string() + MIRROR)));
         let mut with = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
@@ -332,7 +334,8 @@ fn odd_scenes_are_rendered_without_a_fault() {
                 let mut integrator = integrator.clone();
                 *integrator.hide_emitters() = depth == Some(4);
                 *integrator.max_depth().unwrap() = depth;
-                integrator.solve().unwrap().error = 1e-2;
+                let solve = integrator.solve().unwrap();
+                (solve.error, solve.walks) = (1e-2, 1 << 12);
                 look(&mut compiled, integrator, 1);
             }
         }

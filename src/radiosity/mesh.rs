@@ -302,6 +302,6 @@ pub fn of_piece(scene: &Scene, surfaces: &Surfaces, facet: u32, piece: &Piece) -
         look,
         piece.outline,
         points,
-        surfaces.gloss_as_diffuse,
+        surfaces.cut.gloss_as_diffuse,
     )
 }

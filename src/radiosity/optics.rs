@@ -40,18 +40,6 @@ pub fn at(scene: &Scene, hit: &Hit, u: f32) -> Optics {
     }
 }
 
-/// Whether a side of a surface reflects diffusely or shines, judged at about `points` points.
-pub fn takes_part(
-    scene: &Scene,
-    look: impl Fn(DVec2) -> Hit,
-    outline: Outline,
-    points: u32,
-    gloss_as_diffuse: bool,
-) -> bool {
-    let mean = mean(scene, look, outline, points, gloss_as_diffuse);
-    mean.albedo + mean.emission != Rgb64::ZERO
-}
-
 /// The mean over `points` points in the piece's outline, which `look` turns into hits. The points are spread well
 /// but not in rows, which patterns of textures could fall in step with (the sequence R of Roberts 2018, "The
 /// Unreasonable Effectiveness of Quasirandom Sequences"). With `gloss_as_diffuse`, what is reflected in other ways

@@ -1,6 +1,8 @@
 //! The surfaces of a scene that take part in radiosity, cut into flat facets.
 
+use super::dark::DarkSides;
 use super::piece::{Outline, Piece};
+use super::{Rgb64, optics};
 use crate::geom::{Geometry, Hit, Mesh, PlaceId, RawHit, Ray, ShapeId};
 use crate::math::{DVec2, DVec3, Vec2};
 use crate::scene::Scene;
@@ -73,6 +75,18 @@ impl LeftOut {
     }
 }
 
+/// What of the surfaces of a scene is cut, and how.
+#[derive(Clone, Debug, Default)]
+pub struct Cut {
+    /// Largest distance of a curved shape from its facets, relative to its radius.
+    pub curve_error: f64,
+    /// Whether opaque surfaces that reflect in other ways than diffusely are treated as if they did so diffusely:
+    /// their light is not lost, but goes astray.
+    pub gloss_as_diffuse: bool,
+    /// Sides that have no facets unless they shine.
+    pub dark: DarkSides,
+}
+
 /// All facets, and how to find that of a hit.
 #[derive(Debug)]
 pub struct Surfaces {
@@ -82,11 +96,7 @@ pub struct Surfaces {
     placed: HashMap<(u32, u32), Slot>,
     facet_of: Vec<[u32; 2]>,
     pub left_out: LeftOut,
-    /// Largest distance of a curved shape from its facets, relative to its radius.
-    pub curve_error: f64,
-    /// Whether opaque surfaces that reflect in other ways than diffusely are treated as if they did so diffusely:
-    /// their light is not lost, but goes astray.
-    pub gloss_as_diffuse: bool,
+    pub cut: Cut,
 }
 
 const NONE: u32 = u32::MAX;
@@ -99,11 +109,15 @@ impl Surfaces {
     /// Cuts all surfaces of `scene` that stand still. Facets keep nearer to curved shapes than `curve_error` of
     /// their radius. A side without diffuse reflection and emission has no facets.
     pub fn new(scene: &Scene, curve_error: f64) -> Surfaces {
-        Surfaces::of(scene, curve_error, false)
+        let cut = Cut {
+            curve_error,
+            ..Cut::default()
+        };
+        Surfaces::of(scene, cut)
     }
 
-    /// The same; with `gloss_as_diffuse`, sides that reflect in whatever way have facets.
-    pub fn of(scene: &Scene, curve_error: f64, gloss_as_diffuse: bool) -> Surfaces {
+    /// The same as `cut` asks for.
+    pub fn of(scene: &Scene, cut: Cut) -> Surfaces {
         let world = scene.world();
         let mut surfaces = Surfaces {
             facets: Vec::new(),
@@ -111,8 +125,7 @@ impl Surfaces {
             placed: HashMap::new(),
             facet_of: Vec::new(),
             left_out: LeftOut::default(),
-            curve_error,
-            gloss_as_diffuse,
+            cut,
         };
         for number in 0..world.geometries().len() as u32 {
             let shape = ShapeId(number);
@@ -263,7 +276,7 @@ impl Surfaces {
         place: PlaceId,
     ) -> [u32; 2] {
         // A chord of the angle a leaves the circle by 1 - cos(a/2) of the radius.
-        let angle = 2.0 * (1.0 - self.curve_error.clamp(1e-6, 0.3)).acos();
+        let angle = 2.0 * (1.0 - self.cut.curve_error.clamp(1e-6, 0.3)).acos();
         let around = |angle: f64| (std::f64::consts::TAU / angle).ceil().max(6.0) as u32;
         let (nu, nv) = match shape_geometry {
             // The middle of a cell's diagonal leaves the sphere by as much as both of its sides together.
@@ -337,7 +350,10 @@ impl Surfaces {
             }
             let points = if scene.varies(facet.shape) { 16 } else { 1 };
             let (look, outline) = (|st| look(scene, &facet, st), facet.piece.outline);
-            if super::optics::takes_part(scene, look, outline, points, self.gloss_as_diffuse) {
+            let mean = optics::mean(scene, look, outline, points, self.cut.gloss_as_diffuse);
+            let reflects =
+                mean.albedo != Rgb64::ZERO && !self.cut.dark.contain(facet.shape, facet.inside);
+            if reflects || mean.emission != Rgb64::ZERO {
                 *number = self.facets.len() as u32;
                 self.facets.push(facet);
             }

@@ -44,6 +44,10 @@ pub struct RadiosityArgs {
     /// [default: what the scene's integrator says, else 1e-5]
     #[arg(long, value_name = "X", value_parser = parse_positive)]
     pub error: Option<f64>,
+    /// Edges of random walks by which the solver hierarchical corrects what links bring; 0: it trusts links
+    /// [default: what the scene's integrator says, else 1048576]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=1 << 32))]
+    pub walks: Option<u64>,
     /// Residual relative to the emitted power at which solving ends
     /// [default: what the scene's integrator says, else 1e-4]
     #[arg(long, value_name = "X", value_parser = parse_positive)]
@@ -158,6 +162,7 @@ impl RadiosityArgs {
         let given = [
             ("--min-size", self.min_size.is_some(), hierarchical),
             ("--error", self.error.is_some(), hierarchical),
+            ("--walks", self.walks.is_some(), hierarchical),
             ("--form-factors", self.form_factors.is_some(), !hierarchical),
             ("--samples", self.samples.is_some(), !hierarchical),
             ("--resolution", self.resolution.is_some(), !hierarchical),
@@ -173,6 +178,7 @@ impl RadiosityArgs {
             patch_size: self.patch_size.or(base.patch_size),
             min_size: self.min_size.or(base.min_size),
             error: self.error.unwrap_or(base.error),
+            walks: self.walks.unwrap_or(base.walks),
             residual: self.residual.unwrap_or(base.residual),
             max_steps: self.max_steps.or(base.max_steps),
             ambient: !self.no_ambient,

@@ -130,7 +130,13 @@ const MIN_SIZE: Param = Param::optional(
 const ERROR: Param = Param::optional(
     "error",
     Kind::Float(Range::Positive),
-    "Greatest error of a link of the solver hierarchical, as a share of the light that is usual at its receiver, times the receiver's share of all area; without it, 1e-5, or 1e-3 behind indirect=gather and 1e-4 behind indirect=guide.",
+    "Greatest error of a link of the solver hierarchical, as a share of the light that is usual at its receiver, times the receiver's share of all area; without it, 1e-5, or 1e-2 behind indirect=gather and 1e-4 behind indirect=guide.",
+);
+const WALKS: Param = Param::int(
+    "walks",
+    (-1, 1 << 32),
+    -1,
+    "Edges of random walks by which the solver hierarchical corrects what links bring; 0: it trusts links; -1: 2^20, or 2^19 with indirect.",
 );
 const RESIDUAL: Param = Param::float(
     "residual",
@@ -283,6 +289,7 @@ pub const PLUGINS: &[Plugin] = &[
             PATCH_SIZE,
             MIN_SIZE,
             ERROR,
+            WALKS,
             RESIDUAL,
             MAX_STEPS,
             CURVE_ERROR,
@@ -312,6 +319,7 @@ pub const PLUGINS: &[Plugin] = &[
             PATCH_SIZE,
             MIN_SIZE,
             ERROR,
+            WALKS,
             RESIDUAL,
             MAX_STEPS,
             CURVE_ERROR,
@@ -337,6 +345,7 @@ pub const PLUGINS: &[Plugin] = &[
             PATCH_SIZE,
             MIN_SIZE,
             ERROR,
+            WALKS,
             RESIDUAL,
             MAX_STEPS,
             CURVE_ERROR,

@@ -2,13 +2,13 @@
 //!
 //! Each link errs by itself, so the form factors of a patch do not sum to what they should: the share of directions
 //! in which there are patches. Where they sum to more than 1, light would be made of nothing, and they are scaled
-//! down. In a closed scene they are scaled both ways, to 1 less the share of light that meets other things than
-//! patches.
+//! down.
 
+use super::bodies::Parts;
 use super::gather::Field;
-use super::tree::{Kind, NONE, Tree, TreeNode};
-use crate::geom::Hit;
-use crate::math::{DVec2, Frame, Vec2, Vec3, warp};
+use super::tree::{Gain, Kind, NONE, Tree, TreeNode};
+use super::walks::direction;
+use crate::math::{DVec2, Vec2};
 use crate::radiosity::Rgb64;
 use crate::radiosity::mesh::on_facet;
 use crate::sampler::{Sampler, SamplerKind};
@@ -17,51 +17,35 @@ use rayon::prelude::*;
 
 /// Rays that tell whether a scene is closed.
 const RAYS: u64 = 1 << 13;
-/// A scene whose light meets more of other things than patches is not thought of as closed.
-const ELSEWHERE: f64 = 0.2;
 /// What may get out of a closed scene where patches reach through its walls.
 const LEAK: f64 = 2e-3;
-/// A patch with less in its links lies mostly within other bodies: it gets what it gets.
-const BURIED: f64 = 0.7;
 /// Reflectance from which on a patch absorbs nothing: f32 and averages of textures know it no better.
 const ALL: f64 = 1.0 - 1e-6;
 
-/// What scaling had to do.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Balanced {
-    pub closed: bool,
-    /// Mean of |1 - scale| by area.
-    pub mean: f64,
-}
-
-/// Sets the scale of all patches, by the sums of their links.
-pub fn balance(tree: &mut Tree, closed: Option<f64>) -> Balanced {
-    for node in &mut tree.nodes {
-        node.scale = 1.0;
+/// Sets the gain of all patches that are in no body, and of the bodies, by the sums of their links. Gives the mean of
+/// how far that takes them down, by area.
+pub fn balance(tree: &mut Tree, parts: &Parts) -> f64 {
+    let mut field = Field::uniform(tree);
+    let mut sums: Vec<(u32, Rgb64)> = field.gather(tree, parts).concat();
+    for (number, body) in parts.bodies.iter().enumerate() {
+        sums.push((body.node, field.linked_to_body(tree, body, number)));
     }
-    let sums = Field::uniform(tree).gathered(tree);
     let (mut off, mut area) = (0.0, 0.0);
-    for update in sums.iter().flatten() {
-        let node = &mut tree.nodes[update.node as usize];
-        if !is_patch(node) {
-            continue;
-        }
-        let sum = (update.irradiance - node.external).max_element();
-        node.scale = match closed {
-            Some(wanted) if sum > BURIED * wanted => wanted / sum,
-            _ => 1.0f64.min(1.0 / sum),
+    for (node, sum) in sums {
+        let (node, sum) = (&mut tree.nodes[node as usize], sum.max_element());
+        let scale = 1.0f64.min(1.0 / sum);
+        node.gain = Gain {
+            scale: Rgb64::splat(scale),
+            ..Gain::NONE
         };
-        off += (1.0 - node.scale).abs() * node.area;
+        off += (1.0 - scale) * node.area;
         area += node.area;
     }
-    Balanced {
-        closed: closed.is_some(),
-        mean: if area > 0.0 { off / area } else { 0.0 },
-    }
+    if area > 0.0 { off / area } else { 0.0 }
 }
 
-/// If (nearly) no light of `field` gets out of the scene: the share of it that meets patches.
-pub fn closed(scene: &Scene, tree: &Tree, field: &Field, seed: u64) -> Option<f64> {
+/// Whether (nearly) all light of `field` meets patches.
+fn is_closed(scene: &Scene, tree: &Tree, field: &Field, seed: u64) -> bool {
     let mut sums = Vec::with_capacity(tree.nodes.len());
     let mut sum = 0.0;
     for (node, radiosity) in tree.nodes.iter().zip(&field.radiosity) {
@@ -71,7 +55,7 @@ pub fn closed(scene: &Scene, tree: &Tree, field: &Field, seed: u64) -> Option<f6
         sums.push(sum);
     }
     if !(sum.is_finite() && sum > 0.0) {
-        return None;
+        return false;
     }
     let look = |i: u64| {
         let sampler = Sampler::new(SamplerKind::Sobol, seed, u64::MAX, i, 1);
@@ -79,46 +63,25 @@ pub fn closed(scene: &Scene, tree: &Tree, field: &Field, seed: u64) -> Option<f6
         let at = f64::from(pick) * sum;
         let patch = sums.partition_point(|s| *s <= at).min(sums.len() - 1);
         let Kind::Surface { facet, piece } = tree.nodes[patch].kind else {
-            return [0, 0];
+            return false;
         };
         let st = piece.outline.sample(DVec2::new(f64::from(x), f64::from(y)));
         let hit = on_facet(scene, &tree.surfaces, facet, &piece, st);
         let met = scene.intersect(&hit.spawn(direction(&hit, Vec2::new(u, v))));
-        match met {
-            None => [1, 0],
-            Some(met) => [0, u64::from(tree.surfaces.facet_at(&met).is_none())],
-        }
+        met.is_none_or(|met| tree.surfaces.facet_at(&met).is_none())
     };
-    let counts: Vec<[u64; 2]> = (0..RAYS).into_par_iter().map(look).collect();
-    let escaped: u64 = counts.iter().map(|c| c[0]).sum();
-    let elsewhere: u64 = counts.iter().map(|c| c[1]).sum();
-    let share = |n: u64| n as f64 / RAYS as f64;
-    let lost = share(escaped) + share(elsewhere);
-    (share(escaped) <= LEAK && lost <= ELSEWHERE).then_some(1.0 - lost)
+    let lost = (0..RAYS).into_par_iter().filter(|i| look(*i)).count();
+    lost as f64 <= LEAK * RAYS as f64
 }
 
 fn is_patch(node: &TreeNode) -> bool {
     !node.is_cluster() && node.quarters == NONE
 }
 
-/// Whether nothing is absorbed, in a channel that has light.
-pub fn absorbs_nothing(tree: &Tree) -> bool {
+/// Whether nothing is absorbed of the light of `field`, in a channel that has any, and nothing gets out.
+pub fn keeps_all(scene: &Scene, tree: &Tree, field: &Field, seed: u64) -> bool {
     let lit: Rgb64 = tree.emitted_power();
-    let all_white = |c: usize| {
-        let cells = tree.cells.iter();
-        lit[c] > 0.0
-            && cells
-                .into_iter()
-                .all(|&i| tree.nodes[i as usize].albedo[c] >= ALL)
-    };
-    (0..3).any(all_white)
-}
-
-/// A direction away from the front that `hit` is seen from, by its cosine.
-fn direction(hit: &Hit, u: Vec2) -> Vec3 {
-    let front = match hit.ng.dot(hit.wo) < 0.0 {
-        true => -hit.ng,
-        false => hit.ng,
-    };
-    Frame::from_normal(front).to_world(warp::cosine_hemisphere(u))
+    let is_white = |cell: &u32, c: usize| tree.nodes[*cell as usize].albedo[c] >= ALL;
+    let all_white = |c: usize| lit[c] > 0.0 && tree.cells.iter().all(|cell| is_white(cell, c));
+    (0..3).any(all_white) && is_closed(scene, tree, field, seed)
 }

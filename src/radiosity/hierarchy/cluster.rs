@@ -1,6 +1,6 @@
 //! Facets that are near to each other, gathered in clusters.
 
-use super::tree::{Kind, NONE, TreeNode};
+use super::tree::{Gain, Kind, NONE, TreeNode};
 use crate::math::DVec3;
 use crate::radiosity::Rgb64;
 
@@ -201,7 +201,7 @@ fn placeholder() -> TreeNode {
         albedo: Rgb64::ZERO,
         emission: Rgb64::ZERO,
         external: Rgb64::ZERO,
-        scale: 1.0,
+        gain: Gain::NONE,
         links: Vec::new(),
     }
 }

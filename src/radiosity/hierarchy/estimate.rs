@@ -120,9 +120,14 @@ fn between_surfaces(
     }
     let least = factors.iter().copied().fold(f64::INFINITY, f64::min);
     let most = factors.iter().copied().fold(0.0, f64::max);
+    // That no ray arrived does not say that none would: one of so many and two more (the rule of succession).
+    let unseen = match arrived > 0.0 {
+        true => 0.0,
+        false => 0.25 * sent / (4.0 * rays as f64 + 2.0),
+    };
     Estimate {
         form_factor: 0.25 * factors.iter().sum::<f64>(),
-        spread: most - least,
+        spread: (most - least).max(unseen),
         visible: arrived / sent,
     }
 }
@@ -200,6 +205,11 @@ fn between_clusters(scene: &Scene, tree: &Tree, r: u32, s: u32) -> Option<Estima
         }
         false => most.max(visible),
     };
+    let unseen = match arrived > 0.0 {
+        true => 0.0,
+        false => mean / (facing as f64 + 2.0),
+    };
+    let spread = spread.max(unseen);
     Some(Estimate {
         form_factor: form_factor.min(1.0),
         spread: spread.min(1.0),

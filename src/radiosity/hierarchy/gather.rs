@@ -1,139 +1,132 @@
 //! Light over the links: gathered by each node, pushed down to the patches, and pulled up again.
 
-use super::tree::{Kind, Tree, TreeLink, TreeNode};
+use super::bodies::{Body, Parts};
+use super::sphere::Sphere;
+use super::tree::{Kind, NONE, Tree, TreeLink, TreeNode};
 use crate::math::DVec3;
 use crate::radiosity::Rgb64;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// The light that each node sends and receives.
+///
+/// Steps deal with the parts of the tree that are linked; [`Field::spread`] brings the light to what is in bodies.
 pub struct Field {
     /// Mean over the area of each node, in W/m².
     pub radiosity: Vec<Rgb64>,
     pub irradiance: Vec<Rgb64>,
     /// What errors are judged against: the geometric mean of the irradiance of the surfaces of each node, in W/m².
     pub usual: Vec<f64>,
+    /// Irradiance by patch (by node) that comes by no link; then patches do not emit. `None`: that of lights which
+    /// are no patches, and patches emit.
+    pub given: Option<Vec<Rgb64>>,
     /// Of the clusters, by their number: radiant intensity by direction.
     intensity: Vec<Sphere>,
-}
-
-/// Light by direction: radiant intensity of a small body in W/sr, or radiance that arrives in it, by the first
-/// nine spherical harmonics: enough for diffuse surfaces up to a few percent (Ramamoorthi & Hanrahan 2001).
-#[derive(Clone, Copy, Debug, Default)]
-struct Sphere([Rgb64; 9]);
-
-/// The clamped cosine in each band.
-const COSINE: [f64; 9] = {
-    let (one, two) = (2.0 * PI / 3.0, PI / 4.0);
-    [PI, one, one, one, two, two, two, two, two]
-};
-
-/// Real spherical harmonics up to the second band.
-fn harmonics(d: DVec3) -> [f64; 9] {
-    let (x, y, z) = (d.x, d.y, d.z);
-    [
-        0.282_094_791_773_878_14,
-        0.488_602_511_902_919_9 * y,
-        0.488_602_511_902_919_9 * z,
-        0.488_602_511_902_919_9 * x,
-        1.092_548_430_592_079 * x * y,
-        1.092_548_430_592_079 * y * z,
-        0.315_391_565_252_520_05 * (3.0 * z * z - 1.0),
-        1.092_548_430_592_079 * x * z,
-        0.546_274_215_296_039_5 * (x * x - y * y),
-    ]
-}
-
-impl Sphere {
-    /// A surface of radiosity `b`.
-    fn add_surface(&mut self, b: Rgb64, area: f64, normal: DVec3) {
-        if b == Rgb64::ZERO {
-            return;
-        }
-        let power = b * (area / PI);
-        let y = harmonics(normal);
-        for (c, (cosine, y)) in self.0.iter_mut().zip(COSINE.iter().zip(y)) {
-            *c += power * (cosine * y);
-        }
-    }
-
-    fn add(&mut self, o: &Sphere) {
-        for (a, b) in self.0.iter_mut().zip(o.0) {
-            *a += b;
-        }
-    }
-
-    /// Light from the unit vector `d` alone: irradiance `e` on what is at right angles to it.
-    fn add_from(&mut self, d: DVec3, e: Rgb64) {
-        for (c, y) in self.0.iter_mut().zip(harmonics(d)) {
-            *c += e * y;
-        }
-    }
-
-    /// The same radiance from everywhere.
-    fn add_everywhere(&mut self, radiance: Rgb64) {
-        self.0[0] += radiance * (2.0 * PI.sqrt());
-    }
-
-    /// Irradiance of a surface with unit normal `n`.
-    fn irradiance(&self, n: DVec3) -> Rgb64 {
-        let y = harmonics(n);
-        let sum: Rgb64 = (0..9).map(|i| self.0[i] * (COSINE[i] * y[i])).sum();
-        sum.max(Rgb64::ZERO)
-    }
-
-    fn towards(&self, d: DVec3) -> Rgb64 {
-        let y = harmonics(d);
-        let sum: Rgb64 = self.0.iter().zip(y).map(|(c, y)| *c * y).sum();
-        sum.max(Rgb64::ZERO)
-    }
-}
-
-/// New values of one node.
-pub struct Update {
-    pub node: u32,
-    pub radiosity: Rgb64,
-    pub irradiance: Rgb64,
+    /// By body: radiant intensity, and irradiance summed over the area, without what links bring; what links bring.
+    constant: Vec<(Sphere, Rgb64)>,
+    arriving: Vec<Sphere>,
 }
 
 impl Field {
     /// What is emitted, and nothing else.
     pub fn new(tree: &Tree) -> Field {
-        let mut field = Field {
-            radiosity: tree.nodes.iter().map(|n| n.emission).collect(),
-            irradiance: vec![Rgb64::ZERO; tree.nodes.len()],
-            usual: Vec::new(),
-            intensity: Vec::new(),
-        };
+        let mut field = Field::of(tree, None);
         for (b, node) in field.radiosity.iter_mut().zip(&tree.nodes) {
-            *b += node.albedo * node.external;
+            *b = node.emission + node.albedo * node.external;
         }
         field.pull(tree);
         field
     }
 
-    /// The same radiosity everywhere, 1 W/m².
-    pub fn uniform(tree: &Tree) -> Field {
-        let mut field = Field {
-            radiosity: vec![Rgb64::ONE; tree.nodes.len()],
+    /// What patches of `irradiance` reflect, of which `given` comes by no link (both by node); they emit nothing.
+    pub fn reflected(tree: &Tree, given: Vec<Rgb64>, irradiance: Vec<Rgb64>) -> Field {
+        let mut field = Field::of(tree, Some(given));
+        field.irradiance = irradiance;
+        for (i, node) in tree.nodes.iter().enumerate() {
+            field.radiosity[i] = node.albedo * field.irradiance[i];
+        }
+        for &cell in &tree.cells {
+            field.raise_surface(tree, cell);
+        }
+        field.pull(tree);
+        field
+    }
+
+    fn of(tree: &Tree, given: Option<Vec<Rgb64>>) -> Field {
+        Field {
+            radiosity: vec![Rgb64::ZERO; tree.nodes.len()],
             irradiance: vec![Rgb64::ZERO; tree.nodes.len()],
             usual: Vec::new(),
+            given,
             intensity: Vec::new(),
-        };
+            constant: Vec::new(),
+            arriving: Vec::new(),
+        }
+    }
+
+    /// The same radiosity everywhere, 1 W/m².
+    pub fn uniform(tree: &Tree) -> Field {
+        let mut field = Field::of(tree, None);
+        field.radiosity.fill(Rgb64::ONE);
         field.pull(tree);
         field
     }
 
     /// Only what patches emit.
     pub fn of_emission(tree: &Tree) -> Field {
-        let mut field = Field {
-            radiosity: tree.nodes.iter().map(|n| n.emission).collect(),
-            irradiance: vec![Rgb64::ZERO; tree.nodes.len()],
-            usual: Vec::new(),
-            intensity: Vec::new(),
-        };
+        let mut field = Field::of(tree, None);
+        for (b, node) in field.radiosity.iter_mut().zip(&tree.nodes) {
+            *b = node.emission;
+        }
         field.pull(tree);
         field
+    }
+
+    /// Irradiance of a patch that comes by no link.
+    fn apart(&self, tree: &Tree, leaf: u32) -> Rgb64 {
+        match &self.given {
+            Some(given) => given[leaf as usize],
+            None => tree.nodes[leaf as usize].external,
+        }
+    }
+
+    /// Radiosity of a patch of known irradiance.
+    fn sent(&self, node: &TreeNode, irradiance: Rgb64) -> Rgb64 {
+        let reflected = node.albedo * irradiance;
+        match self.given {
+            Some(_) => reflected,
+            None => node.emission + reflected,
+        }
+    }
+
+    /// To be called when the parts or the given irradiance are new.
+    pub fn prepare(&mut self, tree: &Tree, parts: &Parts) {
+        /// Leaves of one task.
+        const CHUNK: usize = 4096;
+        let of = |leaves: &[u32]| {
+            let mut sum = (Sphere::default(), Rgb64::ZERO);
+            for &leaf in leaves {
+                let node = &tree.nodes[leaf as usize];
+                let irradiance = self.apart(tree, leaf);
+                let sent = self.sent(node, irradiance);
+                sum.0.add_surface(sent, node.area, node.normal);
+                sum.1 += irradiance * node.area;
+            }
+            sum
+        };
+        let mut constant = Vec::with_capacity(parts.bodies.len());
+        for body in &parts.bodies {
+            let leaves = &parts.leaves[body.leaves.clone()];
+            let sums: Vec<_> = leaves.par_chunks(CHUNK).map(of).collect();
+            let mut all = (Sphere::default(), Rgb64::ZERO);
+            for (sphere, sum) in &sums {
+                all.0.add(sphere);
+                all.1 += *sum;
+            }
+            constant.push(all);
+        }
+        self.constant = constant;
+        self.arriving = vec![Sphere::default(); parts.bodies.len()];
     }
 
     /// Gives nodes that are new the light of their parents; what they emit and reflect differently counts.
@@ -176,55 +169,174 @@ impl Field {
         self.usual = logs.into_iter().map(f64::exp).collect();
     }
 
-    /// All nodes gather what the others send. Gives Σ A |ΔB| over the patches, summed over the channels, in W.
-    pub fn step(&mut self, tree: &Tree) -> f64 {
-        let updates = self.gathered(tree);
-        let mut change = 0.0;
-        for update in updates.iter().flatten() {
-            let node = update.node as usize;
-            if tree.children(update.node).is_empty() {
-                let difference = (update.radiosity - self.radiosity[node]).abs();
-                change += difference.element_sum() * tree.nodes[node].area;
-            }
-            self.radiosity[node] = update.radiosity;
-            self.irradiance[node] = update.irradiance;
-        }
-        self.pull(tree);
-        change
+    /// All nodes gather what the others send. Gives Σ A |ΔB| over patches and bodies, summed over the channels, in W.
+    pub fn step(&mut self, tree: &Tree, parts: &Parts) -> f64 {
+        let linked = self.gather(tree, parts);
+        self.apply(tree, parts, &linked)
     }
 
-    /// Irradiance that the light of this field makes, per node below the clusters.
-    pub fn arriving(&self, tree: &Tree) -> Vec<Rgb64> {
-        let mut irradiance = vec![Rgb64::ZERO; tree.nodes.len()];
-        for update in self.gathered(tree).iter().flatten() {
-            irradiance[update.node as usize] = update.irradiance;
-        }
-        irradiance
-    }
-
-    /// What each node below clusters would send and receive next.
-    pub fn gathered(&self, tree: &Tree) -> Vec<Vec<Update>> {
+    /// What links bring: kept for the bodies, given for the patches of all other cells, in W/m².
+    pub fn gather(&mut self, tree: &Tree, parts: &Parts) -> Vec<Vec<(u32, Rgb64)>> {
         /// Cells that one task gathers for.
-        const CHUNK: usize = 256;
-        let around = self.around_clusters(tree);
+        const CHUNK: usize = 64;
+        let around = self.around_clusters(tree, parts);
         let gather = |cells: &[u32]| {
-            let mut updates = Vec::with_capacity(2 * cells.len());
+            let mut found = Vec::with_capacity(2 * cells.len());
             for &cell in cells {
                 let node = &tree.nodes[cell as usize];
                 let above = match tree.clusters.get(node.parent as usize) {
                     Some(&number) => around[number as usize].irradiance(node.normal),
                     None => Rgb64::ZERO,
                 };
-                self.push(tree, cell, above, &mut updates);
+                self.push(tree, cell, above, &mut found);
             }
-            updates
+            found
         };
-        tree.cells.par_chunks(CHUNK).map(gather).collect()
+        let linked = parts.cells.par_chunks(CHUNK).map(gather).collect();
+        let arriving = |body: &Body| around[tree.clusters[body.node as usize] as usize];
+        self.arriving = parts.bodies.iter().map(arriving).collect();
+        linked
+    }
+
+    /// Takes over what links bring, as the gains of nodes make it.
+    pub fn apply(&mut self, tree: &Tree, parts: &Parts, linked: &[Vec<(u32, Rgb64)>]) -> f64 {
+        let mut change = 0.0;
+        for &(leaf, linked) in linked.iter().flatten() {
+            let (i, node) = (leaf as usize, &tree.nodes[leaf as usize]);
+            let irradiance = self.apart(tree, leaf) + node.gain.of(linked);
+            let radiosity = self.sent(node, irradiance);
+            change += (radiosity - self.radiosity[i]).abs().element_sum() * node.area;
+            (self.radiosity[i], self.irradiance[i]) = (radiosity, irradiance);
+        }
+        for (number, body) in parts.bodies.iter().enumerate() {
+            let (i, node) = (body.node as usize, &tree.nodes[body.node as usize]);
+            let (constant, received) = &self.constant[number];
+            let (gain, arriving) = (&node.gain, &self.arriving[number]);
+            let mut sent = body.reflect(arriving);
+            sent.scale(gain.scale);
+            let mut more = body.reflects;
+            more.scale(gain.more);
+            sent.add(&more);
+            sent.add(constant);
+            sent.keep_positive();
+            let share = if node.area > 0.0 {
+                1.0 / node.area
+            } else {
+                0.0
+            };
+            let radiosity = sent.power() * share;
+            change += (radiosity - self.radiosity[i]).abs().element_sum() * node.area;
+            self.radiosity[i] = radiosity;
+            self.irradiance[i] =
+                (*received + gain.scale * body.received(arriving)) * share + gain.more;
+            self.intensity[tree.clusters[i] as usize] = sent;
+        }
+        self.raise(tree, parts);
+        change
+    }
+
+    /// Means of what is divided, and of clusters, by what they contain.
+    fn raise(&mut self, tree: &Tree, parts: &Parts) {
+        for &cell in &parts.cells {
+            self.raise_surface(tree, cell);
+        }
+        for &cluster in parts.open.iter().rev() {
+            let mut sum = self.of_surfaces(tree, cluster);
+            for child in tree.children(cluster) {
+                let Some(&number) = tree.clusters.get(child as usize).filter(|n| **n != NONE)
+                else {
+                    continue;
+                };
+                let (i, area) = (child as usize, tree.nodes[child as usize].area);
+                sum.power += self.radiosity[i] * area;
+                sum.arriving += self.irradiance[i] * area;
+                sum.intensity.add(&self.intensity[number as usize]);
+            }
+            self.take(tree, cluster, sum);
+        }
+    }
+
+    /// Means over the quarters of a surface, if it has any.
+    fn raise_surface(&mut self, tree: &Tree, node: u32) {
+        let first = tree.nodes[node as usize].quarters;
+        if first == NONE {
+            return;
+        }
+        let mut mean = (Rgb64::ZERO, Rgb64::ZERO);
+        for quarter in first..first + 4 {
+            self.raise_surface(tree, quarter);
+            mean.0 += self.radiosity[quarter as usize] * 0.25;
+            mean.1 += self.irradiance[quarter as usize] * 0.25;
+        }
+        (
+            self.radiosity[node as usize],
+            self.irradiance[node as usize],
+        ) = mean;
+    }
+
+    fn take(&mut self, tree: &Tree, cluster: u32, sum: Sum) {
+        let (i, node) = (cluster as usize, &tree.nodes[cluster as usize]);
+        let share = if node.area > 0.0 {
+            1.0 / node.area
+        } else {
+            0.0
+        };
+        self.radiosity[i] = sum.power * share;
+        self.irradiance[i] = sum.arriving * share;
+        self.intensity[tree.clusters[i] as usize] = sum.intensity;
+    }
+
+    /// Adds what patches emit to what they send.
+    pub fn emit(&mut self, tree: &Tree) {
+        for (b, node) in self.radiosity.iter_mut().zip(&tree.nodes) {
+            *b += node.emission;
+        }
+    }
+
+    /// What links bring to a body, as the mean over its area.
+    pub fn linked_to_body(&self, tree: &Tree, body: &Body, number: usize) -> Rgb64 {
+        let area = tree.nodes[body.node as usize].area;
+        match area > 0.0 {
+            true => body.received(&self.arriving[number]) / area,
+            false => Rgb64::ZERO,
+        }
+    }
+
+    /// What links bring to a patch in a body.
+    pub fn linked_in_body(&self, tree: &Tree, parts: &Parts, leaf: u32) -> Rgb64 {
+        let body = parts.body_of[leaf as usize];
+        self.arriving[body as usize].irradiance(tree.nodes[leaf as usize].normal)
+    }
+
+    /// Irradiance of a patch in a body.
+    pub fn irradiance_in_body(&self, tree: &Tree, parts: &Parts, leaf: u32) -> Rgb64 {
+        let body = &parts.bodies[parts.body_of[leaf as usize] as usize];
+        let gain = &tree.nodes[body.node as usize].gain;
+        self.apart(tree, leaf) + gain.of(self.linked_in_body(tree, parts, leaf))
+    }
+
+    /// Brings the light that arrives at bodies to their patches, and up again.
+    pub fn spread(&mut self, tree: &Tree, parts: &Parts) {
+        let of = |&leaf: &u32| self.irradiance_in_body(tree, parts, leaf);
+        let irradiance: Vec<Rgb64> = parts.leaves.par_iter().map(of).collect();
+        for (&leaf, irradiance) in parts.leaves.iter().zip(irradiance) {
+            let i = leaf as usize;
+            self.radiosity[i] = self.sent(&tree.nodes[i], irradiance);
+            self.irradiance[i] = irradiance;
+        }
+        for i in (0..tree.nodes.len() as u32).rev() {
+            let node = &tree.nodes[i as usize];
+            let is_cell = |parent: u32| tree.nodes[parent as usize].is_cluster();
+            if parts.body_of[i as usize] != NONE && node.quarters != NONE && is_cell(node.parent) {
+                self.raise_surface(tree, i);
+            }
+        }
+        self.pull(tree);
     }
 
     /// The light that arrives at each cluster by its links and those of the clusters around it.
-    fn around_clusters(&self, tree: &Tree) -> Vec<Sphere> {
-        let own = |&node: &u32| {
+    fn around_clusters(&self, tree: &Tree, parts: &Parts) -> Vec<Sphere> {
+        let own = |node: u32| {
             let node = &tree.nodes[node as usize];
             let mut sum = Sphere::default();
             for link in &node.links {
@@ -232,14 +344,17 @@ impl Field {
             }
             sum
         };
-        let mut around: Vec<Sphere> = tree.by_cluster.par_iter().map(own).collect();
+        let bodies = parts.bodies.iter().map(|body| body.node);
+        let clusters: Vec<u32> = parts.open.iter().copied().chain(bodies).collect();
+        let found: Vec<Sphere> = clusters.par_iter().map(|&node| own(node)).collect();
+        let mut around = vec![Sphere::default(); tree.by_cluster.len()];
         // Clusters come before what they contain.
-        for (i, &node) in tree.by_cluster.iter().enumerate() {
+        for (&node, mut sum) in clusters.iter().zip(found) {
             let parent = tree.nodes[node as usize].parent;
             if let Some(&above) = tree.clusters.get(parent as usize) {
-                let above = around[above as usize];
-                around[i].add(&above);
+                sum.add(&around[above as usize]);
             }
+            around[tree.clusters[node as usize] as usize] = sum;
         }
         around
     }
@@ -291,40 +406,17 @@ impl Field {
         flux * (cos * f64::from(link.visible) / (distance * distance))
     }
 
-    /// Brings light to the patches below `node` and back up: gives the mean radiosity and irradiance.
-    fn push(
-        &self,
-        tree: &Tree,
-        node: u32,
-        above: Rgb64,
-        updates: &mut Vec<Update>,
-    ) -> (Rgb64, Rgb64) {
+    /// Brings light to the patches below `node`.
+    fn push(&self, tree: &Tree, node: u32, above: Rgb64, found: &mut Vec<(u32, Rgb64)>) {
         let n = &tree.nodes[node as usize];
         let mut gathered = above;
         for link in &n.links {
             gathered += self.received(tree, n, link);
         }
-        let children = tree.children(node);
-        let (radiosity, irradiance) = match children.is_empty() {
-            true => {
-                let irradiance = gathered * n.scale + n.external;
-                (n.emission + n.albedo * irradiance, irradiance)
-            }
-            false => {
-                let mut mean = (Rgb64::ZERO, Rgb64::ZERO);
-                for child in children {
-                    let (b, e) = self.push(tree, child, gathered, updates);
-                    mean = (mean.0 + b * 0.25, mean.1 + e * 0.25);
-                }
-                mean
-            }
-        };
-        updates.push(Update {
-            node,
-            radiosity,
-            irradiance,
-        });
-        (radiosity, irradiance)
+        match n.quarters {
+            NONE => found.push((node, gathered)),
+            first => (first..first + 4).for_each(|q| self.push(tree, q, gathered, found)),
+        }
     }
 
     /// Means and intensities of the clusters, by what they contain.

@@ -10,15 +10,20 @@
 //! one to the one that is asked for, with solutions between, so that links are judged by the light that there is.
 
 mod balance;
+mod bodies;
 mod cluster;
+mod correct;
 mod estimate;
 mod gather;
 mod output;
 mod refine;
+mod sphere;
 mod tree;
+mod walks;
 
 use super::{Progress, Report, Rgb64, Solution, SolveError, SolveSpec, Surfaces};
 use crate::scene::Scene;
+use bodies::Parts;
 use gather::Field;
 use refine::Refiner;
 use std::ops::{ControlFlow, Range};
@@ -59,6 +64,8 @@ pub struct Hierarchy {
 const STEP: f64 = 4.0;
 /// Refinements before the last, at most.
 const LOOSER: i32 = 4;
+/// The largest error that is worth a refinement.
+const LOOSEST: f64 = 0.2;
 /// Gathering steps before each refinement but the first, at most.
 const LOOKS: u64 = 5;
 /// Scaling of form factors that is worth a warning, in the mean.
@@ -85,27 +92,31 @@ pub fn solve(
     let emitted = tree.emitted_power();
     let mut field = Field::new(&tree);
     let most = spec.max_steps.unwrap_or(MAX_STEPS);
-    let mut balanced = balance::Balanced::default();
-    for looser in (0..=LOOSER).rev() {
+    let mut too_much = 0.0;
+    let mut parts = Parts::new(&tree);
+    let looser = (LOOSEST / spec.error).log(STEP).floor() as i32;
+    for looser in (0..=looser.clamp(0, LOOSER)).rev() {
         let clock = Instant::now();
         let error = spec.error * STEP.powi(looser);
         // What few links make dark may be brighter than it seems.
         let black = (BLACK * STEP.powi(looser)).min(0.25);
         refiner.refine(&mut tree, &mut field, error, black);
-        let closed = balance::closed(scene, &tree, &field, spec.seed);
-        if closed == Some(1.0) && balance::absorbs_nothing(&tree) {
+        if balance::keeps_all(scene, &tree, &field, spec.seed) {
             return Err(SolveError::NoAbsorption);
         }
-        balanced = balance::balance(&mut tree, closed);
+        parts = Parts::new(&tree);
+        too_much = balance::balance(&mut tree, &parts);
+        field.prepare(&tree, &parts);
         report.form_factor_seconds += clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         // Before the last refinement, it is enough to see where light goes.
         let (wanted, until) = match looser {
-            0 => (spec.residual, most),
+            0 if spec.walks == 0 => (spec.residual, most),
             _ => (spec.residual.max(0.02), most.min(report.steps + LOOKS)),
         };
         loop {
-            report.residual = field.step(&tree) / emitted.element_sum().max(f64::MIN_POSITIVE);
+            report.residual =
+                field.step(&tree, &parts) / emitted.element_sum().max(f64::MIN_POSITIVE);
             report.steps += 1;
             report.converged = looser == 0 && report.residual <= wanted;
             let growing = !report.residual.is_finite();
@@ -113,6 +124,7 @@ pub fn solve(
                 break;
             }
         }
+        field.spread(&tree, &parts);
         report.solve_seconds += clock.elapsed().as_secs_f64();
         if looser == 0 || report.steps >= most {
             break;
@@ -122,15 +134,28 @@ pub fn solve(
         }
     }
     report.links = tree.links();
-    if balanced.mean > MUCH {
-        let to = if balanced.closed { "to" } else { "down to" };
+    let mut direct = None;
+    if report.residual.is_finite() && spec.walks > 0 {
+        let clock = Instant::now();
+        direct = Some(correct::correct(
+            scene,
+            &mut tree,
+            &parts,
+            &mut field,
+            spec,
+            &mut report,
+        ));
+        report.solve_seconds += clock.elapsed().as_secs_f64();
+    }
+    if too_much > MUCH && spec.walks == 0 {
         report.warnings.push(format!(
-            "the form factors of patches were scaled {to} a sum of 1, by {:.0} % in the mean: surfaces that coincide or \
-             let light through, or links that are too coarse",
-            100.0 * balanced.mean
+            "the form factors of patches were scaled down to a sum of 1, by {:.0} % in the mean: surfaces that coincide \
+             or let light through, or links that are too coarse",
+            100.0 * too_much
         ));
     }
-    let solution = output::solution(scene, &tree, &field, report);
+    let direct = direct.unwrap_or_else(|| correct::straight(&tree, &parts));
+    let solution = output::solution(scene, &tree, &field, &direct, report);
     if solution.mesh.is_empty() {
         return Err(SolveError::NoPatches);
     }

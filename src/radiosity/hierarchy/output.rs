@@ -86,13 +86,18 @@ pub fn by_patch(numbers: &Numbers, values: &[Rgb64]) -> Vec<Rgb64> {
 }
 
 /// What was found, with its energy balance.
-pub fn solution(scene: &Scene, tree: &Tree, field: &Field, report: Report) -> Solution {
+pub fn solution(
+    scene: &Scene,
+    tree: &Tree,
+    field: &Field,
+    direct: &[Rgb64],
+    report: Report,
+) -> Solution {
     let (mesh, numbers) = mesh(tree);
-    let direct = Field::of_emission(tree).arriving(tree);
     let mut solution = Solution {
         radiosity: by_patch(&numbers, &field.radiosity),
         irradiance: by_patch(&numbers, &field.irradiance),
-        direct: by_patch(&numbers, &direct),
+        direct: by_patch(&numbers, direct),
         hierarchy: Some(hierarchy(tree, &numbers)),
         mesh,
         report: Report::default(),

@@ -158,9 +158,10 @@ impl<'a> Refiner<'a> {
                     spread: f64::from(link.spread),
                     visible: f64::from(link.visible),
                 };
-                let [spread, varied] = errors(tree, field, r, link.sender, &found);
-                let good = spread + varied <= threshold
-                    || !self.divisible(tree, r, link.sender, spread < varied);
+                let found = errors(tree, field, r, link.sender, &found);
+                let good = self
+                    .to_divide(tree, (r, link.sender), found, threshold)
+                    .is_none();
                 if !good {
                     pairs.push((r, link.sender));
                 }
@@ -189,10 +190,9 @@ impl<'a> Refiner<'a> {
         let Some(found) = estimate(self.scene, tree, r, s, fine) else {
             return Fate::Dropped;
         };
-        let [spread, varied] = errors(tree, field, r, s, &found);
-        let by_sender = self.by_sender(tree, r, s, spread < varied);
-        if spread + varied > threshold && self.divisible(tree, r, s, by_sender) {
-            return Fate::Divided { sender: by_sender };
+        let errors = errors(tree, field, r, s, &found);
+        if let Some(sender) = self.to_divide(tree, (r, s), errors, threshold) {
+            return Fate::Divided { sender };
         }
         Fate::Linked(TreeLink {
             sender: s,
@@ -212,14 +212,26 @@ impl<'a> Refiner<'a> {
         }
     }
 
-    /// Whether one of both can be divided: that which is wanted, or else the other where that is a cluster.
-    fn divisible(&self, tree: &Tree, r: u32, s: u32, by_sender: bool) -> bool {
-        if self.links > MOST_LINKS && r != s {
-            return false;
+    /// Whether a pair errs by more than `threshold`, by its [`errors`], and can be divided: then, whether by its sender.
+    fn to_divide(
+        &self,
+        tree: &Tree,
+        (r, s): (u32, u32),
+        [spread, varied]: [f64; 2],
+        threshold: f64,
+    ) -> Option<bool> {
+        if spread + varied <= threshold || (self.links > MOST_LINKS && r != s) {
+            return None;
         }
-        let can = |node: u32| self.can_be_divided(tree, node);
+        let by_sender = self.by_sender(tree, r, s, spread < varied);
         let (wanted, other) = if by_sender { (s, r) } else { (r, s) };
-        can(wanted) || (tree.nodes[other as usize].is_cluster())
+        if self.can_be_divided(tree, wanted) {
+            return Some(by_sender);
+        }
+        // The other end helps where it is a cluster, or errs by itself.
+        let helps = tree.nodes[other as usize].is_cluster()
+            || (spread.min(varied) > threshold && self.can_be_divided(tree, other));
+        helps.then_some(!by_sender)
     }
 
     fn can_be_divided(&self, tree: &Tree, node: u32) -> bool {
@@ -248,11 +260,7 @@ impl<'a> Refiner<'a> {
             }
             return;
         }
-        let by_sender = match sender {
-            true => self.can_be_divided(tree, s),
-            false => !self.can_be_divided(tree, r),
-        };
-        let node = if by_sender { s } else { r };
+        let node = if sender { s } else { r };
         if !tree.divide(self.scene, node, self.min_size) {
             // Patches ran out while the pairs were looked at.
             if let Some(found) = estimate(self.scene, tree, r, s, true) {
@@ -271,7 +279,7 @@ impl<'a> Refiner<'a> {
             self.light(tree, &quarters);
         }
         for child in tree.children(node) {
-            next.push(if by_sender { (r, child) } else { (child, s) });
+            next.push(if sender { (r, child) } else { (child, s) });
         }
     }
 }

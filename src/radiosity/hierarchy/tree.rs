@@ -37,9 +37,28 @@ pub struct TreeNode {
     pub emission: Rgb64,
     /// Irradiance from lights that are no patches, in W/m².
     pub external: Rgb64,
-    /// Of what links bring to a patch (see `balance`).
-    pub scale: f64,
+    /// What becomes of what links bring to a patch, or to a body.
+    pub gain: Gain,
     pub links: Vec<TreeLink>,
+}
+
+/// What the light of links is multiplied with, and what is added in W/m²: links err, and by how much is known of
+/// many together.
+#[derive(Clone, Copy, Debug)]
+pub struct Gain {
+    pub scale: Rgb64,
+    pub more: Rgb64,
+}
+
+impl Gain {
+    pub const NONE: Gain = Gain {
+        scale: Rgb64::ONE,
+        more: Rgb64::ZERO,
+    };
+
+    pub fn of(&self, linked: Rgb64) -> Rgb64 {
+        self.scale * linked + self.more
+    }
 }
 
 /// Light that comes to a node.
@@ -216,7 +235,7 @@ impl TreeNode {
             albedo,
             emission,
             external: Rgb64::ZERO,
-            scale: 1.0,
+            gain: Gain::NONE,
             links: Vec::new(),
         }
     }

@@ -130,7 +130,7 @@ impl<'a> Combined<'a> {
         Combined {
             spec,
             setting,
-            solving: used.then(|| Solving::of(setting.scene, cache).beside_photons()),
+            solving: used.then(|| Solving::of(setting.scene, cache, &spec.path).beside_photons()),
             aim: setting.scene.aim_at_caustics(),
             count: spec.photons.count.unwrap_or(pixels),
             radius,

@@ -262,7 +262,7 @@ impl<'a> CachedPath<'a> {
         CachedPath {
             path,
             setting,
-            solving: Solving::of(setting.scene, cache),
+            solving: Solving::of(setting.scene, cache, path),
         }
     }
 

@@ -24,7 +24,7 @@ pub(super) use view::View;
 
 use super::PathSpec;
 use super::path::UNBOUNDED;
-use crate::radiosity::SolveSpec;
+use crate::radiosity::{Gloss, SolveSpec};
 use crate::scene::{PlanEntry, Scene};
 
 /// What a path tracer does with the light that diffuse surfaces send each other.
@@ -66,8 +66,10 @@ impl Default for CacheSpec {
             indirect: Indirect::None,
             solve: SolveSpec {
                 error: GATHER_ERROR,
+                walks: CACHE_WALKS,
+                lit_only: true,
                 residual: CACHE_RESIDUAL,
-                gloss_as_diffuse: true,
+                gloss: Gloss::All,
                 ..SolveSpec::default()
             },
             given: None,
@@ -75,10 +77,10 @@ impl Default for CacheSpec {
     }
 }
 
-/// Error of a link that is good enough behind a final gather. Measured at 16 samples per pixel: in Mitsuba's Cornell
-/// box the bias of the mean is 0.8 % with 1e-3 and 0.6 % with 1e-4 or 1e-5, which take 4 and 20 times as long; in a
-/// stairwell of 145,000 patches 4.8 %, 4.2 % and 4.1 %, most of it light by gloss and mirrors, at 3 and 8 times.
-const GATHER_ERROR: f64 = 1e-3;
+/// Error of a link that is good enough behind a final gather, where walks put links right.
+const GATHER_ERROR: f64 = 1e-2;
+/// Edges of these walks: what is read is averaged over many patches.
+const CACHE_WALKS: u64 = 1 << 19;
 /// Share of the light that may still be under way in a cache.
 const CACHE_RESIDUAL: f64 = 1e-3;
 

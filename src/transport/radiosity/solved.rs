@@ -8,9 +8,10 @@ use super::{CacheSpec, Indirect};
 use crate::geom::Hit;
 use crate::math::Rgb;
 use crate::radiosity::{
-    self, Display, Guide, Progress, Report, Rgb64, Solution, SolveError, SolveSpec,
+    self, Display, Gloss, Guide, Progress, Report, Rgb64, Solution, SolveError, SolveSpec,
 };
 use crate::scene::Scene;
+use crate::transport::PathSpec;
 
 /// A solution that is known already. Two are equal if they are the same one.
 #[derive(Clone, Debug)]
@@ -132,8 +133,10 @@ pub struct Solving<'a> {
     spec: &'a SolveSpec,
     given: Option<&'a Solved>,
     made_for: Use,
-    /// Whether light by mirrors and gloss is left out of the solution, since others find it.
-    without_gloss: bool,
+    /// Whether light from emitters by mirrors and gloss is left out of the solution, since photons bring it.
+    beside_photons: bool,
+    /// See [`SolveSpec::max_edges`].
+    max_edges: Option<u32>,
     made: OnceLock<Result<Option<Cache>, SolveError>>,
 }
 
@@ -146,7 +149,8 @@ impl<'a> Solving<'a> {
     ) -> Solving<'a> {
         Solving {
             made_for,
-            without_gloss: false,
+            beside_photons: false,
+            max_edges: spec.max_edges,
             scene,
             spec,
             given,
@@ -155,18 +159,24 @@ impl<'a> Solving<'a> {
     }
 
     /// What a path tracer makes of radiosity.
-    pub fn of(scene: &'a Scene, cache: &'a CacheSpec) -> Solving<'a> {
+    pub fn of(scene: &'a Scene, cache: &'a CacheSpec, path: &PathSpec) -> Solving<'a> {
         let made_for = match cache.indirect {
             Indirect::Guide => Use::Guide,
-            Indirect::None | Indirect::Gather => Use::Smooth,
+            // A final gather sees no single patch.
+            Indirect::None | Indirect::Gather => Use::Flat,
         };
-        Solving::new(scene, &cache.solve, cache.given.as_ref(), made_for)
+        // From the eye to where it is read, by the shortest way, a path has two edges.
+        let max_edges = path.max_depth.map(|depth| depth.saturating_sub(2).max(1));
+        Solving {
+            max_edges: cache.solve.max_edges.or(max_edges),
+            ..Solving::new(scene, &cache.solve, cache.given.as_ref(), made_for)
+        }
     }
 
     /// The same without light by mirrors and gloss where it is read: what photons bring must not be read too.
     pub fn beside_photons(self) -> Solving<'a> {
         Solving {
-            without_gloss: self.made_for != Use::Guide,
+            beside_photons: self.made_for != Use::Guide,
             ..self
         }
     }
@@ -203,10 +213,14 @@ impl<'a> Solving<'a> {
     }
 
     fn to_solve(&self) -> SolveSpec {
-        let spec = self.spec.clone();
+        let gloss = match self.spec.gloss {
+            Gloss::All if self.beside_photons => Gloss::BetweenDiffuse,
+            other => other,
+        };
         SolveSpec {
-            gloss_as_diffuse: spec.gloss_as_diffuse && !self.without_gloss,
-            ..spec
+            gloss,
+            max_edges: self.max_edges,
+            ..self.spec.clone()
         }
     }
 

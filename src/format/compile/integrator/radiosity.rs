@@ -7,7 +7,7 @@ use crate::transport::radiosity::{GUIDE_ERROR, Indirect, Show};
 use crate::transport::{CacheSpec, IntegratorSpec, PathSpec, RadiositySpec};
 
 /// Parameters that only a solution needs.
-const SOLVING: [&str; 11] = [
+const SOLVING: [&str; 12] = [
     "solver",
     "form_factors",
     "resolution",
@@ -15,6 +15,7 @@ const SOLVING: [&str; 11] = [
     "patch_size",
     "min_size",
     "error",
+    "walks",
     "residual",
     "max_steps",
     "curve_error",
@@ -32,7 +33,7 @@ pub fn solve(props: &Props, defaults: SolveSpec) -> Result<SolveSpec, SceneError
         false => Ok(None),
     };
     if solver != Solver::Hierarchical {
-        for name in ["min_size", "error"] {
+        for name in ["min_size", "error", "walks"] {
             if props.is_given(name) {
                 let what = format!(
                     "\"{name}\" has no effect with the solver \"{}\"",
@@ -43,6 +44,7 @@ pub fn solve(props: &Props, defaults: SolveSpec) -> Result<SolveSpec, SceneError
             }
         }
     }
+    let walks = u64::try_from(props.int("walks")?).ok();
     let max_steps = u64::try_from(props.int("max_steps")?).ok();
     Ok(SolveSpec {
         solver,
@@ -50,6 +52,7 @@ pub fn solve(props: &Props, defaults: SolveSpec) -> Result<SolveSpec, SceneError
         patch_size: optional("patch_size")?,
         min_size: optional("min_size")?,
         error: optional("error")?.unwrap_or(defaults.error),
+        walks: walks.unwrap_or(defaults.walks),
         residual: props.float("residual")?,
         max_steps,
         curve_error: props.float("curve_error")?,
