@@ -108,6 +108,16 @@ impl Sampler {
         }
     }
 
+    /// Numbers for walks that are tried before the picture, which they do not change.
+    #[inline]
+    pub fn of_pilot(self) -> Sampler {
+        Sampler {
+            kind: SamplerKind::Independent,
+            stream: mix(self.stream ^ 0x7069_6c6f_7400_0001),
+            ..self
+        }
+    }
+
     /// The numbers of part `i` of `n` that the sample is split into from some vertex on: all parts of all
     /// samples are spread together.
     #[inline]

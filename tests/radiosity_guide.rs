@@ -59,7 +59,10 @@ fn compiled(xml: &str, indirect: Indirect, seed: u64) -> Compiled {
         Indirect::None => IntegratorSpec::Path(path),
         other => IntegratorSpec::Cached(CachedSpec {
             path,
-            cache: CacheSpec::of(other),
+            cache: CacheSpec {
+                always: true,
+                ..CacheSpec::of(other)
+            },
         }),
     };
     compiled
@@ -123,4 +126,36 @@ fn threads_make_no_difference() {
         pool.unwrap().install(work)
     };
     assert_eq!(by(1), by(4));
+}
+
+/// By default, a few walks decide.
+fn rendered(xml: &str, threads: usize) -> (Vec<[f64; 3]>, bool) {
+    let mut compiled = compiled(xml, Indirect::Guide, 5);
+    if let IntegratorSpec::Cached(spec) = &mut compiled.job.integrator {
+        spec.cache.always = false;
+    }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let (film, stats) = pool.unwrap().install(|| render::render(&compiled, 4));
+    (film.mean(), stats.solution.is_some())
+}
+
+#[test]
+fn nothing_is_solved_for_direct_light() {
+    let plates = |albedo: f32| {
+        let content = format!(
+            r#"<shape type="rectangle"><transform name="to_world"><scale value="3"/><translate z="-2"/></transform>
+            <bsdf type="diffuse"><rgb name="reflectance" value="{albedo}"/></bsdf></shape>
+            <shape type="rectangle"><transform name="to_world"><scale value="2"/><rotate x="1" angle="-90"/>
+            <translate y="-2"/></transform><bsdf type="diffuse"><rgb name="reflectance" value="{albedo}"/></bsdf></shape>
+            <emitter type="point"><point name="position" x="0" y="1" z="1"/>
+            <rgb name="intensity" value="10"/></emitter>"#
+        );
+        scene(-1, &camera(16, 55.0), &content)
+    };
+    assert!(!rendered(&plates(0.02), 2).1);
+    // Nearly all that the camera sees is lit by other surfaces. Pixels are so small that few have edges.
+    let lamp = room(LAMP).replace("\"16\"", "\"48\"");
+    let (picture, solved) = rendered(&lamp, 1);
+    assert!(solved);
+    assert_eq!(picture, rendered(&lamp, 4).0);
 }

@@ -177,6 +177,11 @@ impl Guide {
         self.glow[patch as usize].radiance
     }
 
+    /// Probability with which `patch` is aimed at for `receiver`.
+    pub fn probability(&self, receiver: Receiver, patch: u32) -> f64 {
+        self.per_power(receiver, patch) * self.power.over(patch, patch + 1)
+    }
+
     /// A direction from `p` towards a point that sends light to `receiver`; `choice` in [0,1) chooses the patch, `u`
     /// in [0,1)² the point. `None` where the patch that was chosen turns its back.
     #[inline]

@@ -277,6 +277,9 @@ impl<'a> Transport<'a> {
         &self,
         observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<f64, SolveError> {
+        if let Work::Cached(engine) = &self.work {
+            return engine.prepare(observe);
+        }
         self.solving()
             .map_or(Ok(0.0), |solving| solving.prepare(observe))
     }

@@ -25,7 +25,7 @@ use super::light_walk::LightWalk;
 use super::mis::Techniques;
 use super::path::{Start, UNBOUNDED};
 use super::photons::{self, Kernel, KernelShape, PhotonMap, Shoot};
-use super::radiosity::{Cache, Guiding, Reader, Reads, Solving};
+use super::radiosity::{Cache, Guided, Guiding, Reader, Reads, Solving};
 use super::{CacheSpec, Iteration, Ledger, Li, PathSpec, PhotonSpec, Setting, Technique};
 use crate::geom::Ray;
 use crate::light::Aim;
@@ -232,7 +232,7 @@ impl<'a> Combined<'a> {
                 alone: false,
                 found: Default::default(),
             };
-            let mut guiding = Guiding::new(scene, guide, gathering);
+            let mut guiding = Guiding::new(scene, guide, gathering, Guided::Everywhere);
             let start = Start::at_camera(ray);
             let li = path.walk(scene, start, sampler, &mut ledger.rays, &mut guiding);
             let found = guiding.gather.found;

@@ -19,13 +19,17 @@
 //! patch's mean would show in corners: the walk goes on from y as if it had no patch, and the same holds for
 //! surfaces without patches.
 
-use std::ops::AddAssign;
+use std::ops::{AddAssign, ControlFlow};
+use std::sync::OnceLock;
+use std::time::Instant;
 
+use super::pilot::{Help, Pilot};
 use super::solved::Cache;
-use super::{CacheSpec, Guiding, Solving};
+use super::{CacheSpec, Guided, Guiding, Indirect, Solving};
 use crate::bsdf::{Density, Mode};
 use crate::geom::Ray;
 use crate::math::{PI, Rgb, Vec2, Vec3};
+use crate::radiosity::{Progress, SolveError};
 use crate::sampler::{Sampler, dim};
 use crate::scene::Scene;
 use crate::transport::combined::{Caustics, Gathering};
@@ -254,7 +258,12 @@ impl<const CAUSTICS: bool> Gather for Reader<'_, CAUSTICS> {
 pub struct CachedPath<'a> {
     path: &'a PathSpec,
     setting: Setting<'a>,
+    guides: bool,
+    /// See [`CacheSpec::always`].
+    always: bool,
     pub solving: Solving<'a>,
+    /// How walks are guided, once that is found out.
+    help: OnceLock<Help>,
 }
 
 impl<'a> CachedPath<'a> {
@@ -262,21 +271,51 @@ impl<'a> CachedPath<'a> {
         CachedPath {
             path,
             setting,
+            guides: cache.indirect == Indirect::Guide,
+            always: cache.always,
             solving: Solving::of(setting.scene, cache, path),
+            help: OnceLock::new(),
         }
+    }
+
+    /// As [`Solving::prepare`]; where walks are to be guided, not if that cannot pay.
+    pub fn prepare(
+        &self,
+        observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    ) -> Result<f64, SolveError> {
+        let start = Instant::now();
+        let pilot = Pilot {
+            path: self.path,
+            setting: self.setting,
+        };
+        let asks = self.guides && !self.always && !self.solving.is_settled();
+        if asks && !pilot.is_worth_a_solution() {
+            self.solving.skip();
+        }
+        self.solving.prepare(observe)?;
+        let guide = self.solving.get().and_then(|cache| cache.guide.as_ref());
+        self.help.get_or_init(|| match guide {
+            None => Help::None,
+            Some(_) if self.always => Help::By(Guided::Everywhere),
+            Some(guide) => pilot.choose(guide),
+        });
+        Ok(start.elapsed().as_secs_f64())
     }
 
     /// One sample of the radiance along `ray`.
     #[inline]
     pub fn sample(&self, ray: Ray, sampler: &Sampler, ledger: &mut Ledger) -> Li {
         let (scene, cache) = (self.setting.scene, self.solving.get());
-        if let Some(guide) = cache.and_then(|cache| cache.guide.as_ref()) {
-            let mut guiding = Guiding::new(scene, guide, WalkOnly);
-            let start = Start::at_camera(ray);
+        let start = Start::at_camera(ray);
+        if self.guides {
+            let guide = cache.and_then(|cache| cache.guide.as_ref());
+            let (Some(guide), Some(Help::By(guided))) = (guide, self.help.get()) else {
+                return self.path.li(scene, ray, sampler, &mut ledger.rays);
+            };
+            let mut guiding = Guiding::new(scene, guide, WalkOnly, *guided);
             return (self.path).walk(scene, start, sampler, &mut ledger.rays, &mut guiding);
         }
         let mut reader = Reader::<false>::new(scene, self.path, cache, Reads::ReflectedBehind);
-        let start = Start::at_camera(ray);
         let li = (self.path).walk(scene, start, sampler, &mut ledger.rays, &mut reader);
         ledger.fresh_bias = reader.bias;
         li

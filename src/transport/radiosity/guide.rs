@@ -22,11 +22,21 @@ use crate::scene::Scene;
 use crate::transport::PathStats;
 use crate::transport::path::{Gather, Gathered, Onward, Vertex};
 
+/// What of a walk is guided.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Guided {
+    /// Where it goes, and where it ends.
+    Everywhere,
+    /// Where it ends.
+    EndsOnly,
+}
+
 /// Guides one walk of the eye, which gathers beside what `gather` does.
 pub struct Guiding<'a, G> {
     scene: &'a Scene,
     guide: &'a Guide,
     pub gather: G,
+    guided: Guided,
     /// Of the current vertex, where the guide takes part.
     place: Option<Place>,
     /// What the edge from there meets, and the patch there, where that was found out.
@@ -60,8 +70,9 @@ const WINDOW: f32 = 0.15;
 const LEAST_SURVIVAL: f32 = 0.1;
 
 impl<'a, G> Guiding<'a, G> {
-    pub fn new(scene: &'a Scene, guide: &'a Guide, gather: G) -> Guiding<'a, G> {
+    pub fn new(scene: &'a Scene, guide: &'a Guide, gather: G, guided: Guided) -> Guiding<'a, G> {
         Guiding {
+            guided,
             scene,
             guide,
             gather,
@@ -89,8 +100,34 @@ impl<'a, G> Guiding<'a, G> {
             let irradiance = self.guide.irradiance(patch);
             self.expected = Some(reflected.luminance() * irradiance * (1.0 / PI));
         }
-        let share = SHARE * diffuse;
+        let share = match self.guided {
+            Guided::Everywhere => SHARE * diffuse,
+            Guided::EndsOnly => 0.0,
+        };
         Some(Place { receiver, share })
+    }
+
+    /// What is met from `vertex` in direction `wi`, whose patch is then known.
+    #[inline]
+    fn look(&mut self, vertex: &Vertex, wi: Vec3) -> Option<Hit> {
+        let met = self.scene.intersect(&vertex.hit.spawn(wi));
+        self.ahead = met.as_ref().map(|met| Ahead {
+            p: met.p,
+            shape: met.shape,
+            patch: self.guide.patch(met),
+        });
+        met
+    }
+
+    /// A direction by the BSDF, and what it meets.
+    #[inline]
+    fn unguided(&mut self, vertex: &Vertex, u_lobe: f32, u: Vec2) -> Option<Onward> {
+        let sample = vertex.shading.sample(u_lobe, u, Mode::Radiance)?;
+        let met = match sample.density {
+            Density::PerSr(_) => Some(self.look(vertex, sample.wi)),
+            Density::Delta => None,
+        };
+        Some(Onward { sample, met })
     }
 
     /// A direction by either way, and what it meets if the guide takes part.
@@ -103,6 +140,9 @@ impl<'a, G> Guiding<'a, G> {
         u: Vec2,
     ) -> Option<Onward> {
         let (hit, shading) = (vertex.hit, vertex.shading);
+        if share == 0.0 {
+            return self.unguided(vertex, u_lobe, u);
+        }
         let rest = 1.0 - share;
         let block = dim::VERTEX + (vertex.edges - 1) * dim::PER_VERTEX + dim::PATCH;
         let coarse = match shading.bsdf {
@@ -132,12 +172,7 @@ impl<'a, G> Guiding<'a, G> {
             };
             (sample.wi, sample.weight * pdf, pdf, None)
         };
-        let met = self.scene.intersect(&hit.spawn(wi));
-        self.ahead = met.as_ref().map(|met| Ahead {
-            p: met.p,
-            shape: met.shape,
-            patch: self.guide.patch(met),
-        });
+        let met = self.look(vertex, wi);
         let patch = self.ahead.and_then(|ahead| ahead.patch);
         if aimed.is_some() && aimed != patch {
             return None;

@@ -12,12 +12,13 @@
 
 mod gather;
 mod guide;
+mod pilot;
 mod solved;
 mod view;
 
 pub use gather::Bias;
 pub(super) use gather::{CachedPath, Reader, Reads};
-pub(super) use guide::Guiding;
+pub(super) use guide::{Guided, Guiding};
 pub use solved::Solved;
 pub(super) use solved::{Cache, Solving, Use};
 pub(super) use view::View;
@@ -58,6 +59,8 @@ pub struct CacheSpec {
     pub solve: SolveSpec,
     /// What is read, if it is known already.
     pub given: Option<Solved>,
+    /// Whether walks are guided also where a few that are tried before say that it does not pay.
+    pub always: bool,
 }
 
 impl Default for CacheSpec {
@@ -73,6 +76,7 @@ impl Default for CacheSpec {
                 ..SolveSpec::default()
             },
             given: None,
+            always: false,
         }
     }
 }
@@ -133,7 +137,7 @@ pub struct RadiositySpec {
 const CACHED_EDGES: u32 = 4;
 
 /// Greatest error of a link where radiosity guides walks (see [`SolveSpec::error`]).
-pub const GUIDE_ERROR: f64 = 1e-4;
+pub const GUIDE_ERROR: f64 = 1e-3;
 
 impl CacheSpec {
     /// What is made of light between diffuse surfaces, with a solution as good as that needs.
@@ -146,6 +150,7 @@ impl CacheSpec {
             indirect,
             solve,
             given: None,
+            always: false,
         }
     }
 
@@ -168,7 +173,10 @@ impl CacheSpec {
         Some(entry(self.is_used(scene, path), scene, || {
             let solver = self.solve.solver.name();
             let used = match self.indirect {
-                Indirect::Guide => "sends walks from diffuse surfaces where their light comes from",
+                Indirect::Guide => {
+                    "sends walks from diffuse surfaces where their light comes from, unless walks tried before say that it \
+                     does not pay"
+                }
                 _ => "read where a walk meets a second diffuse surface",
             };
             format!("solved once (solver {solver}), {used}")

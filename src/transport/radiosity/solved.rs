@@ -194,6 +194,16 @@ impl<'a> Solving<'a> {
         }
     }
 
+    /// Solves nothing, unless that is done: there is then nothing to read.
+    pub fn skip(&self) {
+        let _ = self.made.get_or_init(|| Ok(None));
+    }
+
+    /// Whether the solution, or that there is none, is known already.
+    pub fn is_settled(&self) -> bool {
+        self.given.is_some() || self.made.get().is_some()
+    }
+
     fn make(
         &self,
         observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,

@@ -132,6 +132,7 @@ pub fn cache(props: &Props) -> Result<CacheSpec, SceneError> {
         indirect,
         solve,
         given: None,
+        always: false,
     })
 }
 
