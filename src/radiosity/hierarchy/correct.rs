@@ -57,13 +57,17 @@ pub fn correct(
         settled = report.residual <= spec.residual;
         report.converged = settled && looks;
         if report.converged || !report.residual.is_finite() {
-            if let Some(edges) = spec.max_edges.filter(|&e| u64::from(e) <= step) {
-                reflected = edge_by_edge(tree, parts, &direct, edges);
-            }
             break;
         }
     }
-    reflected.spread(tree, parts);
+    let linked = reflected.gather(tree, parts);
+    let [by_links, irradiance] = by_patch(tree, parts, &reflected, &walks, &met, &linked);
+    let arriving = walks.arriving(&irradiance);
+    let (in_bodies, _) = walks.gains(tree, &Order::new(tree, None), &arriving, &by_links, prior);
+    if let Some(edges) = spec.max_edges.filter(|&e| u64::from(e) < report.steps) {
+        reflected = edge_by_edge(tree, parts, &direct, edges);
+    }
+    reflected.spread(tree, parts, Some(&in_bodies));
     reflected.emit(tree);
     *field = reflected;
     direct
