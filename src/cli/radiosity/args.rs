@@ -46,7 +46,7 @@ pub struct RadiosityArgs {
     pub error: Option<f64>,
     /// Edges of random walks by which the solver hierarchical corrects what links bring; 0: it trusts links
     /// [default: what the scene's integrator says, else 1048576]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=1 << 32))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=1 << 26))]
     pub walks: Option<u64>,
     /// Residual relative to the emitted power at which solving ends
     /// [default: what the scene's integrator says, else 1e-4]
