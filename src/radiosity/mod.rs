@@ -131,6 +131,9 @@ pub struct SolveSpec {
     pub seed: u64,
 }
 
+/// Fewer walks than this, but for none, say too little of light to be asked for.
+pub const LEAST_WALKS: u64 = 1 << 12;
+
 impl Default for SolveSpec {
     fn default() -> SolveSpec {
         SolveSpec {

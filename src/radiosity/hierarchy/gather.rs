@@ -11,6 +11,7 @@ use std::f64::consts::PI;
 /// The light that each node sends and receives.
 ///
 /// Steps deal with the parts of the tree that are linked; [`Field::spread`] brings the light to what is in bodies.
+#[derive(Clone)]
 pub struct Field {
     /// Mean over the area of each node, in W/m².
     pub radiosity: Vec<Rgb64>,

@@ -144,6 +144,7 @@ pub fn solve(
             &mut field,
             spec,
             &mut report,
+            observe,
         ));
         report.solve_seconds += clock.elapsed().as_secs_f64();
     }
