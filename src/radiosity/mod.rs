@@ -131,6 +131,9 @@ pub struct SolveSpec {
     pub seed: u64,
 }
 
+/// Fewer walks than this, but for none, say too little of light to be asked for.
+pub const LEAST_WALKS: u64 = 1 << 12;
+
 impl Default for SolveSpec {
     fn default() -> SolveSpec {
         SolveSpec {
@@ -235,6 +238,8 @@ pub enum SolveError {
     },
     /// A closed scene that absorbs nothing has no finite solution.
     NoAbsorption,
+    /// The light that was found has grown beyond all numbers.
+    Unbounded { solver: &'static str },
     /// The form factors of a patch sum to more than 1, so that its light grows though some is absorbed.
     Diverges {
         solver: &'static str,
@@ -266,6 +271,11 @@ impl fmt::Display for SolveError {
             ),
             SolveError::NoAbsorption => f.write_str(
                 "the scene is closed and absorbs nothing: its radiosity grows without limit",
+            ),
+            SolveError::Unbounded { solver } => write!(
+                f,
+                "the solver {solver} does not converge: light grows without limit; use smaller errors or another \
+                 number of walks"
             ),
             SolveError::Diverges {
                 solver,
@@ -334,7 +344,18 @@ pub fn solve(
         return Err(SolveError::NoPatches);
     }
     match spec.solver {
-        Solver::Hierarchical => hierarchy::solve(scene, surfaces, spec, observe),
+        Solver::Hierarchical => {
+            let mut solution = hierarchy::solve(scene, surfaces, spec, observe)?;
+            // What reads it would spread it all over the picture.
+            let mut found = solution.radiosity.iter().chain(&solution.irradiance);
+            if !found.all(|x| x.is_finite()) {
+                let solver = spec.solver.name();
+                return Err(SolveError::Unbounded { solver });
+            }
+            let doubts = report::doubts(&solution.report);
+            solution.report.warnings.extend(doubts);
+            Ok(solution)
+        }
         _ => solvers::solve(scene, surfaces, spec, observe),
     }
 }

@@ -15,6 +15,9 @@ pub(super) struct Balance<'a> {
     pub escaped: Rgb64,
 }
 
+/// Light made of nothing that is worth a sentence, as a share of what is emitted.
+const MADE: f64 = 0.1;
+
 /// Shares of light below this are not worth a sentence.
 const NEGLIGIBLE: f64 = 1e-3;
 
@@ -98,9 +101,54 @@ fn warnings(surfaces: &Surfaces, report: &Report) -> Vec<String> {
     warnings
 }
 
+/// What the user should know of a solution by links: that it is not done, or has more light than there can be.
+pub(super) fn doubts(report: &Report) -> Vec<String> {
+    let mut doubts = Vec::new();
+    if !report.converged {
+        doubts.push(format!(
+            "the solver stopped after {} steps with a residual of {:.2e}, which is more than was asked for",
+            report.steps, report.residual
+        ));
+    }
+    let given = (report.emitted + report.external).element_sum();
+    let absorbed = report.absorbed.element_sum();
+    // What passes through masks counts as absorbed; and what still grows says nothing.
+    if report.converged && report.other <= NEGLIGIBLE && absorbed > given * (1.0 + MADE) {
+        doubts.push(format!(
+            "patches absorb {:.3} times the light that there is: surfaces that coincide, or lights much smaller \
+             than patches; use a smaller min_size",
+            absorbed / given
+        ));
+    }
+    doubts
+}
+
 fn shapes(count: u32) -> String {
     match count {
         1 => "1 shape".to_string(),
         n => format!("{n} shapes"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What of the light of 1 W that is absorbed is worth a sentence.
+    #[test]
+    fn says_what_cannot_be() {
+        let report = |converged, absorbed: f64, other| Report {
+            converged,
+            emitted: Rgb64::ONE,
+            absorbed: Rgb64::splat(absorbed),
+            other,
+            ..Report::default()
+        };
+        assert!(doubts(&report(true, 1.05, 0.0)).is_empty());
+        assert!(doubts(&report(true, 1.5, 0.4)).is_empty());
+        let made = doubts(&report(true, 1.5, 0.0));
+        assert!(matches!(&made[..], [one] if one.contains("1.500 times")));
+        let stopped = doubts(&report(false, 1.5, 0.0));
+        assert!(matches!(&stopped[..], [one] if one.contains("stopped after 0 steps")));
     }
 }

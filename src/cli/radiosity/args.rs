@@ -8,7 +8,7 @@ use crate::cli::Failure;
 use crate::cli::progress::ProgressMode;
 use crate::cli::render::parse_define;
 use crate::radiosity::export::{Shading, Up};
-use crate::radiosity::{FormFactorMethod, SolveSpec, Solver};
+use crate::radiosity::{FormFactorMethod, LEAST_WALKS, SolveSpec, Solver};
 use crate::transport::IntegratorSpec;
 
 #[derive(Args, Debug)]
@@ -44,9 +44,9 @@ pub struct RadiosityArgs {
     /// [default: what the scene's integrator says, else 1e-5]
     #[arg(long, value_name = "X", value_parser = parse_positive)]
     pub error: Option<f64>,
-    /// Edges of random walks by which the solver hierarchical corrects what links bring; 0: it trusts links
+    /// Edges of random walks by which the solver hierarchical corrects what links bring; 0: it trusts links; else at least 4096
     /// [default: what the scene's integrator says, else 1048576]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=1 << 32))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=1 << 26))]
     pub walks: Option<u64>,
     /// Residual relative to the emitted power at which solving ends
     /// [default: what the scene's integrator says, else 1e-4]
@@ -170,6 +170,10 @@ impl RadiosityArgs {
         ];
         if let Some((name, ..)) = given.iter().find(|(_, given, works)| *given && !works) {
             let what = format!("{name} has no effect with the solver {}", solver.name());
+            return Err(Failure::Usage(what));
+        }
+        if self.walks.is_some_and(|n| (1..LEAST_WALKS).contains(&n)) {
+            let what = format!("--walks: so few say too little, give 0 or at least {LEAST_WALKS}");
             return Err(Failure::Usage(what));
         }
         Ok(SolveSpec {

@@ -134,7 +134,7 @@ const ERROR: Param = Param::optional(
 );
 const WALKS: Param = Param::int(
     "walks",
-    (-1, 1 << 32),
+    (-1, 1 << 26),
     -1,
     "Edges of random walks by which the solver hierarchical corrects what links bring; 0: it trusts links; -1: 2^20, or 2^19 with indirect.",
 );

@@ -5,13 +5,14 @@ use super::gather::Field;
 use super::output;
 use super::tree::{Gain, NONE, Tree};
 use super::walks::{Order, Walks};
-use crate::radiosity::{Report, Rgb64, SolveSpec};
+use crate::radiosity::{Progress, Report, Rgb64, SolveSpec};
 use crate::scene::Scene;
 use rayon::prelude::*;
+use std::ops::ControlFlow;
 
 /// Steps that all look at the gains; how far walks are trusted is settled then.
 const OFTEN: u64 = 8;
-/// Of those after, one in so many does.
+/// Of those after, one in so many does; and all while light grows, which gains may be the cause of.
 const SELDOM: u64 = 32;
 
 /// Solves again, with what links bring to patches corrected by walks (see [`super::walks`]): light straight from
@@ -23,6 +24,7 @@ pub fn correct(
     field: &mut Field,
     spec: &SolveSpec,
     report: &mut Report,
+    observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Vec<Rgb64> {
     let (mesh, numbers) = output::mesh(tree);
     let walks = Walks::new(scene, tree, (&mesh, numbers.leaf), field, spec);
@@ -36,11 +38,11 @@ pub fn correct(
     let irradiance = std::mem::take(&mut field.irradiance);
     let mut reflected = Field::reflected(tree, direct.clone(), irradiance);
     reflected.prepare(tree, parts);
-    let (mut prior, mut settled) = (None, false);
+    let (mut prior, mut settled, mut grows) = (None, false, false);
     for step in 1..=spec.max_steps.unwrap_or(super::MAX_STEPS) {
         let linked = reflected.gather(tree, parts);
         // Bright rooms take many steps, of which gains need few.
-        let looks = settled || step <= OFTEN || step % SELDOM == 0;
+        let looks = settled || grows || step <= OFTEN || step % SELDOM == 0;
         if looks {
             let [by_links, irradiance] = by_patch(tree, parts, &reflected, &walks, &met, &linked);
             let arriving = walks.arriving(&irradiance);
@@ -53,17 +55,31 @@ pub fn correct(
         }
         let change = reflected.apply(tree, parts, &linked);
         report.steps += 1;
-        report.residual = change / emitted.max(f64::MIN_POSITIVE);
+        let residual = change / emitted.max(f64::MIN_POSITIVE);
+        grows = residual > report.residual;
+        report.residual = residual;
         settled = report.residual <= spec.residual;
         report.converged = settled && looks;
         if report.converged || !report.residual.is_finite() {
-            if let Some(edges) = spec.max_edges.filter(|&e| u64::from(e) <= step) {
-                reflected = edge_by_edge(tree, parts, &direct, edges);
-            }
             break;
         }
+        if step % SELDOM == 0 {
+            let mut seen = reflected.clone();
+            seen.spread(tree, parts, None);
+            seen.emit(tree);
+            if super::observes(tree, &seen, report, observe).is_break() {
+                break;
+            }
+        }
     }
-    reflected.spread(tree, parts);
+    let linked = reflected.gather(tree, parts);
+    let [by_links, irradiance] = by_patch(tree, parts, &reflected, &walks, &met, &linked);
+    let arriving = walks.arriving(&irradiance);
+    let (in_bodies, _) = walks.gains(tree, &Order::new(tree, None), &arriving, &by_links, prior);
+    if let Some(edges) = spec.max_edges.filter(|&e| u64::from(e) < report.steps) {
+        reflected = edge_by_edge(tree, parts, &direct, edges);
+    }
+    reflected.spread(tree, parts, Some(&in_bodies));
     reflected.emit(tree);
     *field = reflected;
     direct

@@ -64,13 +64,19 @@ pub fn estimate(scene: &Scene, tree: &Tree, r: u32, s: u32, fine: bool) -> Optio
                 move |st: DVec2| on_facet(scene, &tree.surfaces, facet, &piece, st)
             };
             let numbers = Numbers::new(r, s);
-            Some(between_surfaces(
+            let found = between_surfaces(
                 scene,
                 (receiver, &rp, &look(rf, rp)),
                 (&sp, &look(sf, sp)),
                 numbers,
                 if fine { 4 } else { 1 },
-            ))
+            );
+            // All that the sender gets of what the receiver would send is 1: so much is known of a small sender.
+            let most = sender.area / receiver.area;
+            Some(Estimate {
+                form_factor: found.form_factor.min(most),
+                ..found
+            })
         }
         _ => between_clusters(scene, tree, r, s),
     }
@@ -211,7 +217,7 @@ fn between_clusters(scene: &Scene, tree: &Tree, r: u32, s: u32) -> Option<Estima
     };
     let spread = spread.max(unseen);
     Some(Estimate {
-        form_factor: form_factor.min(1.0),
+        form_factor: form_factor.min(1.0).min(sender.area / receiver.area),
         spread: spread.min(1.0),
         visible,
     })

@@ -2,7 +2,7 @@
 
 use super::bodies::{Body, Parts};
 use super::sphere::Sphere;
-use super::tree::{Kind, NONE, Tree, TreeLink, TreeNode};
+use super::tree::{Gain, Kind, NONE, Tree, TreeLink, TreeNode};
 use crate::math::DVec3;
 use crate::radiosity::Rgb64;
 use rayon::prelude::*;
@@ -11,6 +11,7 @@ use std::f64::consts::PI;
 /// The light that each node sends and receives.
 ///
 /// Steps deal with the parts of the tree that are linked; [`Field::spread`] brings the light to what is in bodies.
+#[derive(Clone)]
 pub struct Field {
     /// Mean over the area of each node, in W/m².
     pub radiosity: Vec<Rgb64>,
@@ -308,16 +309,23 @@ impl Field {
         self.arriving[body as usize].irradiance(tree.nodes[leaf as usize].normal)
     }
 
-    /// Irradiance of a patch in a body.
+    /// Irradiance of a patch in a body, by the gain of the body.
     pub fn irradiance_in_body(&self, tree: &Tree, parts: &Parts, leaf: u32) -> Rgb64 {
         let body = &parts.bodies[parts.body_of[leaf as usize] as usize];
         let gain = &tree.nodes[body.node as usize].gain;
         self.apart(tree, leaf) + gain.of(self.linked_in_body(tree, parts, leaf))
     }
 
-    /// Brings the light that arrives at bodies to their patches, and up again.
-    pub fn spread(&mut self, tree: &Tree, parts: &Parts) {
-        let of = |&leaf: &u32| self.irradiance_in_body(tree, parts, leaf);
+    /// Brings the light that arrives at bodies to their patches, and up again; by the gains of bodies, or by `gains` of
+    /// the patches (by node).
+    pub fn spread(&mut self, tree: &Tree, parts: &Parts, gains: Option<&[Gain]>) {
+        let of = |&leaf: &u32| match gains {
+            None => self.irradiance_in_body(tree, parts, leaf),
+            Some(gains) => {
+                let linked = self.linked_in_body(tree, parts, leaf);
+                self.apart(tree, leaf) + gains[leaf as usize].of(linked)
+            }
+        };
         let irradiance: Vec<Rgb64> = parts.leaves.par_iter().map(of).collect();
         for (&leaf, irradiance) in parts.leaves.iter().zip(irradiance) {
             let i = leaf as usize;

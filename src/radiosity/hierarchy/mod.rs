@@ -124,7 +124,7 @@ pub fn solve(
                 break;
             }
         }
-        field.spread(&tree, &parts);
+        field.spread(&tree, &parts, None);
         report.solve_seconds += clock.elapsed().as_secs_f64();
         if looser == 0 || report.steps >= most {
             break;
@@ -144,6 +144,7 @@ pub fn solve(
             &mut field,
             spec,
             &mut report,
+            observe,
         ));
         report.solve_seconds += clock.elapsed().as_secs_f64();
     }

@@ -217,10 +217,30 @@ impl Walks {
             let pairs = (0..sums.len()).filter_map(with_parent);
             points_of_prior(sums.first(), arrived.squares, pairs)
         });
-        let mut out: Vec<Gain> = Vec::with_capacity(sums.len());
-        for (i, sums) in sums.iter().enumerate() {
-            let above = above(i).map_or(Gain::NONE, |above| out[above]);
-            out.push(sums.gain(&above, prior));
+        let mut out = vec![Gain::NONE; sums.len()];
+        // What is thought to have arrived: of the root, what did.
+        let mut arrived: Vec<Rgb64> = sums.iter().map(|s| s.arrived).collect();
+        for (i, &node) in order.nodes.iter().enumerate() {
+            let inherited = above(i).map_or(Gain::NONE, |above| out[above]);
+            out[i] = sums[i].gain(arrived[i], inherited);
+            let inside = tree
+                .children(node)
+                .map(|c| order.number[c as usize] as usize);
+            // The parts of a body are not told apart.
+            let inside = inside.filter(|c| *c != i);
+            let mut whole = Rgb64::ZERO;
+            for c in inside.clone() {
+                arrived[c] = sums[c].believed(&out[i], prior);
+                whole += arrived[c];
+            }
+            // Together what arrived at the whole.
+            let share = arrived[i] / whole;
+            for c in inside {
+                let believed = arrived[c] * share;
+                if believed.is_finite() {
+                    arrived[c] = believed;
+                }
+            }
         }
         (out, prior)
     }
@@ -313,25 +333,32 @@ impl Sums {
         self.linked += o.linked;
     }
 
-    /// What was found here, and what is known of the node above, by what they are worth.
-    fn gain(&self, above: &Gain, prior: f64) -> Gain {
+    /// What arrived, as far as can be known by what was found here and by the gain of the node above.
+    fn believed(&self, above: &Gain, prior: f64) -> Rgb64 {
+        if self.n <= 0.0 {
+            return Rgb64::ZERO;
+        }
+        let share = prior / self.n;
+        let expected = above.scale * self.linked + above.more * self.n;
+        (self.arrived + expected * share) / (1.0 + share)
+    }
+
+    /// The gain that makes it `arrived`; `inherited` where nothing is known.
+    fn gain(&self, arrived: Rgb64, inherited: Gain) -> Gain {
         /// By how much links may be scaled up; what is still missing is added, the same everywhere.
         const MOST: f64 = 4.0;
         if self.n <= 0.0 {
-            return *above;
+            return inherited;
         }
-        let share = prior / self.n;
-        let arrived = self.arrived + (self.linked * above.scale + above.more * self.n) * share;
-        let linked = self.linked * (1.0 + share);
         let of = |c: usize| {
-            let ratio = arrived[c] / linked[c];
+            let ratio = arrived[c] / self.linked[c];
             match ratio.is_finite() {
                 true => ratio.min(MOST),
                 false => 1.0,
             }
         };
         let scale = Rgb64::new(of(0), of(1), of(2));
-        let more = (arrived - scale * linked).max(Rgb64::ZERO) / (self.n * (1.0 + share));
+        let more = (arrived - scale * self.linked).max(Rgb64::ZERO) / self.n;
         Gain { scale, more }
     }
 }

@@ -10,14 +10,14 @@
 //! | L D (S\|G)* E, at x | next-event estimation at x and the walk, weighted against each other |
 //! | L (S\|G)+ D (S\|G)* E, at x | the walk; caustics by photons around x, if these are shot |
 //! | L D (S\|G)* D (S\|G)* E, at y | light samples at y alone: the walk ends there |
-//! | L … D D (S\|G)* D (S\|G)* E, at y | the cache, which has those that diffuse surfaces alone bring |
+//! | L … (S\|G\|D)+ D (S\|G)* D (S\|G)* E, at y | the cache |
 //! | L S+ D (S\|G)* D (S\|G)* E, at y | photons around y, if these are shot |
 //!
-//! So each path is found once at most. What makes the bias, together with the patches' size, is light at y that came
-//! by S or G behind it: what opaque surfaces reflect so is solved for as if it were reflected diffusely (see
-//! [`SolveSpec::gloss_as_diffuse`](crate::radiosity::SolveSpec)), or lost where photons bring caustics. Where y lies nearer to x than its patch is large, the
-//! patch's mean would show in corners: the walk goes on from y as if it had no patch, and the same holds for
-//! surfaces without patches.
+//! So each path is found once at most. What makes the bias is the size of patches, and the noise of the walks that
+//! corrected the solution; these also follow light by S and G to y (see
+//! [`SolveSpec::gloss`](crate::radiosity::SolveSpec)). Where y lies nearer to x than its patch is large, the patch's
+//! mean would show in corners: the walk goes on from y as if it had no patch, and the same holds for surfaces without
+//! patches.
 
 use std::ops::{AddAssign, ControlFlow};
 use std::sync::OnceLock;

@@ -2,7 +2,7 @@
 
 use crate::format::compile::{on_command_line, suggest};
 use crate::format::{Overrides, Props, SceneError};
-use crate::radiosity::{FormFactorMethod, SolveSpec, Solver};
+use crate::radiosity::{FormFactorMethod, LEAST_WALKS, SolveSpec, Solver};
 use crate::transport::radiosity::{GUIDE_ERROR, Indirect, Show};
 use crate::transport::{CacheSpec, IntegratorSpec, PathSpec, RadiositySpec};
 
@@ -45,6 +45,11 @@ pub fn solve(props: &Props, defaults: SolveSpec) -> Result<SolveSpec, SceneError
         }
     }
     let walks = u64::try_from(props.int("walks")?).ok();
+    if walks.is_some_and(|n| (1..LEAST_WALKS).contains(&n)) {
+        let what = format!("so few \"walks\" say too little: {}", walks.unwrap_or(0));
+        let help = format!("give 0, to trust links, or at least {LEAST_WALKS}");
+        return Err(props.error_at("walks", what).with_help(help));
+    }
     let max_steps = u64::try_from(props.int("max_steps")?).ok();
     Ok(SolveSpec {
         solver,
