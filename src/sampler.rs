@@ -112,7 +112,6 @@ impl Sampler {
     #[inline]
     pub fn of_pilot(self) -> Sampler {
         Sampler {
-            kind: SamplerKind::Independent,
             stream: mix(self.stream ^ 0x7069_6c6f_7400_0001),
             ..self
         }

@@ -8,27 +8,29 @@ use super::guide::{Guided, Guiding};
 use crate::geom::Ray;
 use crate::math::Vec2;
 use crate::radiosity::Guide;
-use crate::sampler::{Sampler, SamplerKind, dim};
+use crate::sampler::{Sampler, dim};
 use crate::scene::CameraSample;
 use crate::transport::path::{Start, WalkOnly};
 use crate::transport::{PathSpec, PathStats, Setting};
 use rayon::prelude::*;
 
 /// Rows and columns of the places on the film, at most.
-const GRID: u32 = 64;
-/// Walks of each way from each place.
-const WALKS: u32 = 4;
+const GRID: u32 = 32;
+/// Sets of walks of each way from each place, and walks of each: the means of these sets differ by what is left to chance
+/// by the points of the sampler.
+const SETS: u32 = 4;
+const WALKS: u32 = 8;
 /// Share of the places, those where walks differ most, that is left out: a few of them would decide by chance.
-const LEFT_OUT: f64 = 0.005;
+const LEFT_OUT: f64 = 0.002;
 /// Rows and columns of places around one that say what is seen there.
-const BLOCK: usize = 8;
+const BLOCK: usize = 4;
 /// What differs is relative to what is seen plus this share of its mean over the film, squared.
 const DARK: f64 = 0.1;
 /// Cost of a ray of a walk that is ended by radiosity, and of one that it also guides, over that of a plain walk:
 /// what is met has to be found among the patches, and then in a table. Measured in rooms of 3,000 to 500,000 patches:
-/// 1.1 to 1.3, and 1.4 to 1.65.
-const ENDED: f64 = 1.2;
-const GUIDED: f64 = 1.5;
+/// 1.1 to 1.4, and 1.4 to 1.9.
+const ENDED: f64 = 1.25;
+const GUIDED: f64 = 1.6;
 /// What longer paths add to the variance of direct light must be more than this share of it for a solution to be worth
 /// its while: measured, guiding won no more than 1.05 times below, and 1.2 to 2.2 times from a share of 4 on.
 const LEAST: f64 = 1.0;
@@ -115,23 +117,22 @@ impl Pilot<'_> {
     /// What walks find at each place: of the whole film, so that what is cropped looks the same.
     fn fly(&self, walk: impl Fn(Ray, &Sampler, &mut PathStats) -> f32 + Sync) -> Vec<Found> {
         let Setting {
-            camera, film, seed, ..
+            camera,
+            film,
+            seed,
+            sampler,
+            ..
         } = self.setting;
         let (nx, ny) = (self.columns(), film.height.min(GRID));
         let at_place = |place: u32| {
             let mut stats = PathStats::default();
-            let (mut sum, mut squares) = (0.0, 0.0);
-            for number in 0..WALKS {
-                let sampler = Sampler::new(
-                    SamplerKind::Independent,
-                    seed,
-                    u64::from(place),
-                    u64::from(number),
-                    1,
-                )
-                .of_pilot();
-                let [u, v, lens_u, lens_v] = sampler.get4(dim::CAMERA);
-                let [time, ..] = sampler.get4(dim::TIME);
+            let mut sums = [0.0; SETS as usize];
+            for number in 0..SETS * WALKS {
+                let numbers =
+                    Sampler::new(sampler, seed, u64::from(place), u64::from(number), SETS);
+                let numbers = numbers.of_pilot();
+                let [u, v, lens_u, lens_v] = numbers.get4(dim::CAMERA);
+                let [time, ..] = numbers.get4(dim::TIME);
                 let at = |i: u32, n: u32, size: u32| {
                     let pixel = (2 * u64::from(i) + 1) * u64::from(size) / (2 * u64::from(n));
                     pixel as f32
@@ -146,16 +147,16 @@ impl Pilot<'_> {
                     time,
                 };
                 let seen = camera.ray(&sample);
-                let value = f64::from(seen.weight * walk(seen.ray, &sampler, &mut stats));
+                let value = f64::from(seen.weight * walk(seen.ray, &numbers, &mut stats));
                 if value.is_finite() {
-                    sum += value;
-                    squares += value * value;
+                    sums[(number % SETS) as usize] += value / f64::from(WALKS);
                 }
             }
-            let n = f64::from(WALKS);
+            let n = f64::from(SETS);
+            let mean = sums.iter().sum::<f64>() / n;
             Found {
-                mean: sum / n,
-                variance: (squares - sum * sum / n).max(0.0) / (n - 1.0),
+                mean,
+                variance: sums.iter().map(|sum| (sum - mean).powi(2)).sum::<f64>() / (n - 1.0),
                 rays: stats.total(),
             }
         };
