@@ -6,8 +6,8 @@
 
 use super::bodies::Parts;
 use super::gather::Field;
+use super::trace::direction;
 use super::tree::{Gain, Kind, NONE, Tree, TreeNode};
-use super::walks::direction;
 use crate::math::{DVec2, Vec2};
 use crate::radiosity::Rgb64;
 use crate::radiosity::mesh::on_facet;

@@ -2,14 +2,21 @@
 
 use super::bodies::Parts;
 use super::gather::Field;
-use super::output;
-use super::tree::{Gain, NONE, Tree};
+use super::trace::{Traces, Visit};
+use super::tree::{Gain, Kind, NONE, Tree};
 use super::walks::{Order, Walks};
+use super::{output, refine};
+use crate::math::DVec2;
 use crate::radiosity::{Progress, Report, Rgb64, SolveSpec};
 use crate::scene::Scene;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
+/// Points of walks for which a patch is divided, at least.
+const POINTS: usize = 16;
+/// Variance between quarters of a patch over that within, times the degrees of freedom of the former: what chance
+/// alone exceeds in one case of a thousand (chi-square, 3 degrees of freedom).
+const SURE: f64 = 16.27;
 /// Steps that all look at the gains; how far walks are trusted is settled then.
 const OFTEN: u64 = 8;
 /// Of those after, one in so many does; and all while light grows, which gains may be the cause of.
@@ -20,19 +27,20 @@ const SELDOM: u64 = 32;
 pub fn correct(
     scene: &Scene,
     tree: &mut Tree,
-    parts: &Parts,
     field: &mut Field,
     spec: &SolveSpec,
     report: &mut Report,
     observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
 ) -> Vec<Rgb64> {
-    let (mesh, numbers) = output::mesh(tree);
-    let walks = Walks::new(scene, tree, (&mesh, numbers.leaf), field, spec);
+    let mut walks = walks(scene, tree, field, spec);
+    let parts = &Parts::new(tree);
     let emitted = tree.emitted_power().element_sum();
     for node in &mut tree.nodes {
         node.gain = Gain::NONE;
     }
     let direct = corrected(tree, parts, &walks);
+    let of_patch = |&leaf: &u32| direct[leaf as usize];
+    walks.set_straight(walks.leaf.iter().map(of_patch).collect());
     let met = walks.met();
     let order = Order::new(tree, Some(parts));
     let irradiance = std::mem::take(&mut field.irradiance);
@@ -83,6 +91,93 @@ pub fn correct(
     reflected.emit(tree);
     *field = reflected;
     direct
+}
+
+/// Traces walks, and divides patches as finely as these tell them apart.
+fn walks(scene: &Scene, tree: &mut Tree, field: &mut Field, spec: &SolveSpec) -> Walks {
+    let (mesh, traced) = output::mesh(tree);
+    let lit = |&node: &u32| field.radiosity[node as usize].element_sum() > 0.0;
+    let lit: Vec<bool> = traced.leaf.iter().map(lit).collect();
+    let traces = Traces::new(scene, tree, &mesh, &lit, spec);
+    let reflected = |patch: u32| {
+        let node = traced.leaf[patch as usize] as usize;
+        field.irradiance[node]
+    };
+    let brought = traces.brought(reflected);
+    let sample = |(visit, brought): (&Visit, f32)| Sample {
+        node: traced.leaf[visit.at.patch as usize],
+        st: visit.at.st,
+        brought,
+    };
+    let mut samples: Vec<Sample> = traces.visits.iter().zip(brought).map(sample).collect();
+    samples.par_sort_by_key(|s| s.node);
+    let min_size = refine::min_size(tree, spec);
+    for of_one in samples.chunk_by_mut(|a, b| a.node == b.node) {
+        divide(scene, tree, of_one, min_size);
+    }
+    field.grow(tree);
+    let (_, now) = output::mesh(tree);
+    Walks::new(tree, traces, &traced.leaf, now.leaf)
+}
+
+/// What comes to a point of a leaf, which is given in the coordinates of its piece.
+struct Sample {
+    node: u32,
+    st: [f32; 2],
+    /// By the first solution: in W/m², summed over the channels.
+    brought: f32,
+}
+
+/// Divides the leaf of `samples` into quarters, and these again, as long as what comes to them differs.
+fn divide(scene: &Scene, tree: &mut Tree, samples: &mut [Sample], min_size: f64) {
+    let Some(&Sample { node, .. }) = samples.first() else {
+        return;
+    };
+    let Kind::Surface { piece, .. } = tree.nodes[node as usize].kind else {
+        return;
+    };
+    if samples.len() < POINTS {
+        return;
+    }
+    // By quarter: number, sum and sum of squares.
+    let mut sums = [[0.0; 3]; 4];
+    let quarter_of = |sample: &Sample| {
+        let st = DVec2::from_array(sample.st.map(f64::from));
+        piece.outline.child_at(st)
+    };
+    for sample in samples.iter() {
+        let (x, sums) = (f64::from(sample.brought), &mut sums[quarter_of(sample).0]);
+        for (sum, more) in sums.iter_mut().zip([1.0, x, x * x]) {
+            *sum += more;
+        }
+    }
+    if !differ(&sums) || !tree.divide(scene, node, min_size) {
+        return;
+    }
+    let first = tree.nodes[node as usize].quarters;
+    for sample in samples.iter_mut() {
+        let (quarter, inside) = quarter_of(sample);
+        sample.node = first + quarter as u32;
+        sample.st = inside.as_vec2().to_array();
+    }
+    samples.sort_by_key(|s| s.node);
+    for of_one in samples.chunk_by_mut(|a, b| a.node == b.node) {
+        divide(scene, tree, of_one, min_size);
+    }
+}
+
+/// Whether means differ by more than chance makes them: number, sum and sum of squares of each are given.
+fn differ(sums: &[[f64; 3]; 4]) -> bool {
+    let whole: [f64; 3] = std::array::from_fn(|i| sums.iter().map(|s| s[i]).sum());
+    let mean = whole[1] / whole[0];
+    let filled = sums.iter().filter(|s| s[0] > 0.0);
+    let between: f64 = filled
+        .clone()
+        .map(|[n, sum, _]| n * (sum / n - mean).powi(2))
+        .sum();
+    let within = whole[2] - whole[0] * mean * mean - between;
+    let freedom = whole[0] - filled.count() as f64;
+    freedom > 0.0 && between * freedom > SURE * within
 }
 
 /// Irradiance that links bring straight from emitters, by node.

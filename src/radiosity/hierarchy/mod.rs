@@ -18,6 +18,7 @@ mod gather;
 mod output;
 mod refine;
 mod sphere;
+mod trace;
 mod tree;
 mod walks;
 
@@ -140,7 +141,6 @@ pub fn solve(
         direct = Some(correct::correct(
             scene,
             &mut tree,
-            &parts,
             &mut field,
             spec,
             &mut report,

@@ -41,6 +41,12 @@ enum Fate {
     },
 }
 
+/// Edges of patches are not divided below this length, in scene units.
+pub fn min_size(tree: &Tree, spec: &SolveSpec) -> f64 {
+    let size = 2.0 * tree.nodes[0].radius;
+    spec.min_size.unwrap_or(size * MIN_SIZE)
+}
+
 impl<'a> Refiner<'a> {
     /// Also finds the light that comes from lights that are no patches.
     pub fn new(
@@ -49,12 +55,11 @@ impl<'a> Refiner<'a> {
         spec: &SolveSpec,
         tree: &mut Tree,
     ) -> Refiner<'a> {
-        let size = 2.0 * tree.nodes[0].radius;
         let refiner = Refiner {
             scene,
             others: Others::new(scene, surfaces),
             seed: spec.seed,
-            min_size: spec.min_size.unwrap_or(size * MIN_SIZE),
+            min_size: min_size(tree, spec),
             dormant: vec![(0, 0)],
             links: 0,
         };

@@ -1,7 +1,7 @@
 //! The nodes: clusters above, facets and their quarters below.
 
 use super::cluster;
-use crate::math::DVec3;
+use crate::math::{DVec2, DVec3};
 use crate::radiosity::discontinuity::{self, Divisions, Limits};
 use crate::radiosity::mesh::{self, Division, of_piece};
 use crate::radiosity::{Piece, Rgb64, SolveError, SolveSpec, Surfaces};
@@ -176,6 +176,22 @@ impl Tree {
             Kind::Surface { .. } if n.quarters != NONE => n.quarters..n.quarters + 4,
             Kind::Surface { .. } => 0..0,
         }
+    }
+
+    /// The leaf at `st` of a surface.
+    pub fn leaf_at(&self, mut node: u32, st: [f32; 2]) -> u32 {
+        let mut st = DVec2::from_array(st.map(f64::from));
+        while let TreeNode {
+            quarters,
+            kind: Kind::Surface { piece, .. },
+            ..
+        } = &self.nodes[node as usize]
+            && *quarters != NONE
+        {
+            let (quarter, inside) = piece.outline.child_at(st);
+            (node, st) = (quarters + quarter as u32, inside);
+        }
+        node
     }
 
     /// Divides a surface that is not divided yet; false where that cannot be done.

@@ -1,32 +1,20 @@
 //! What arrives at patches by rays, to put links right.
 //!
 //! Links err one by one: what one ray too few found to be blocked brings nothing, and a gap that many links go
-//! through is too dark by all of them. So where it counts, random walks from surface to surface look at the scene
-//! itself. Each edge of a walk, from a point x in a direction by the cosine to the point y, is a sample of the
-//! irradiance at x: E(x) = π ⟨L(y → x)⟩, with L(y → x) = ρ E(y) / π from the solution. The light that links bring to a
-//! node is then scaled so that it is, in the mean over the points that walks left from, what arrived by them.
+//! through is too dark by all of them. So where it counts, random walks (see [`trace`]) look at the scene itself. The
+//! light that links bring to a node is then scaled so that it is, in the mean over the points that walks left from,
+//! what arrived by them. Patches where many walks came by are divided first: what lies on both sides of a wall, or of
+//! the edge of a shadow, has one light as far as links know, but not as far as walks do.
 //!
 //! Since walks meet surfaces as light does, points count by what they see of the scene: the parts of a patch that
-//! lie behind a wall or within another body have no walks, and do not darken the rest. On the way, mirrors, glass
-//! and gloss do to a walk what they do to light.
+//! lie behind a wall or within another body have no walks, and do not darken the rest.
 
 use super::bodies::Parts;
-use super::gather::Field;
+use super::trace::{self, Point, Traces};
 use super::tree::{Gain, NONE, Tree};
-use crate::bsdf::{Bsdf, Density, Mode};
-use crate::geom::Hit;
-use crate::math::{DVec2, Frame, PI, Rgb, Vec2, Vec3, warp};
-use crate::radiosity::mesh::{Patch, on_facet};
+use crate::radiosity::Rgb64;
 use crate::radiosity::optics::rgb64;
-use crate::radiosity::{Gloss, PatchMesh, Rgb64, SolveSpec};
-use crate::sampler::{Sampler, SamplerKind};
-use crate::scene::Scene;
 use rayon::prelude::*;
-
-/// Edges of a walk between diffuse surfaces, at most: enough to get around in a building.
-const LONGEST: u32 = 32;
-/// Mirrors, glass and gloss in a row, at most.
-const PASSES: u32 = 8;
 
 /// Points that walks left from, and what arrives there.
 pub struct Walks {
@@ -41,6 +29,8 @@ pub struct Walks {
     first: Vec<u32>,
     /// By patch: its node.
     pub leaf: Vec<u32>,
+    /// By patch: irradiance straight from emitters as corrected, in W/m².
+    straight: Vec<Rgb64>,
 }
 
 /// What came to the points that walks left from, by patch.
@@ -51,44 +41,26 @@ pub struct Arrived {
     pub squares: f64,
 }
 
-/// An edge brings `weight` times the irradiance of patch `to`.
+/// An edge to a point of patch `to` brings `weight` times the irradiance there.
 #[derive(Clone, Copy)]
 struct Term {
     from: u32,
     to: u32,
     weight: [f32; 3],
-}
-
-/// What one walk met.
-#[derive(Default)]
-struct Walk {
-    visits: Vec<Visit>,
-    terms: Vec<Term>,
-}
-
-/// Irradiance at a point of a patch, in W/m²: straight from emitters, and from these by mirrors, glass and gloss.
-struct Visit {
-    patch: u32,
-    direct: Rgb,
-    stray: Rgb,
+    /// See [`trace::Term`].
+    lit: Option<[f32; 3]>,
 }
 
 impl Walks {
-    /// About as many edges as asked for; fewer where they leave the scene soon. Walks start where the light of `field`
-    /// leaves patches, and go on with equal chances, however dark a surface is.
-    pub fn new(
-        scene: &Scene,
-        tree: &Tree,
-        (mesh, leaf): (&PatchMesh, Vec<u32>),
-        field: &Field,
-        spec: &SolveSpec,
-    ) -> Walks {
-        let mut sums = Vec::with_capacity(leaf.len());
-        let mut sum = 0.0;
-        for (patch, &node) in mesh.patches.iter().zip(&leaf) {
-            sum += (field.radiosity[node as usize].element_sum() * patch.area).max(0.0);
-            sums.push(sum);
+    /// Of `traces`, for a mesh whose patches are the nodes `leaf` of `tree`, which was divided further since
+    /// `traced`, the nodes that patches were when the walks were traced.
+    pub fn new(tree: &Tree, traces: Traces, traced: &[u32], leaf: Vec<u32>) -> Walks {
+        let mut patch_of = vec![NONE; tree.nodes.len()];
+        for (patch, &node) in leaf.iter().enumerate() {
+            patch_of[node as usize] = patch as u32;
         }
+        let patch_at =
+            |at: &Point| patch_of[tree.leaf_at(traced[at.patch as usize], at.st) as usize];
         let mut walks = Walks {
             visits: vec![0; leaf.len()],
             direct: Arrived {
@@ -96,58 +68,34 @@ impl Walks {
                 squares: 0.0,
             },
             stray: vec![Rgb64::ZERO; leaf.len()],
+            straight: vec![Rgb64::ZERO; leaf.len()],
             terms: Vec::new(),
             first: Vec::new(),
             leaf,
         };
-        let walk = |i: u64| {
-            let sampler = Sampler::new(SamplerKind::Sobol, spec.seed, u64::MAX - 1, i, 1);
-            let [x, y, pick, _] = sampler.get4(0);
-            let at = f64::from(pick) * sum;
-            let patch = sums.partition_point(|s| *s <= at).min(sums.len() - 1);
-            let Patch { piece, facet, .. } = mesh.patches[patch];
-            let st = piece.outline.sample(DVec2::new(f64::from(x), f64::from(y)));
-            let hit = on_facet(scene, &tree.surfaces, facet, &piece, st);
-            let walker = Walker {
-                scene,
-                mesh,
-                gloss: spec.gloss,
-                sampler,
-                blocks: 0,
-                walk: Walk::default(),
-            };
-            walker.walk(patch as u32, hit)
-        };
-        // Rounds, until there are enough edges.
-        let round = spec.walks.div_ceil(u64::from(LONGEST));
-        let (mut made, mut number) = (0, 0);
-        while sum.is_finite() && sum > 0.0 && made < spec.walks && number < spec.walks {
-            let found: Vec<Walk> = (number..number + round).into_par_iter().map(walk).collect();
-            number += round;
-            made += walks.add(found);
+        let from: Vec<u32> = traces.visits.par_iter().map(|v| patch_at(&v.at)).collect();
+        for (visit, &patch) in traces.visits.iter().zip(&from) {
+            let patch = patch as usize;
+            walks.visits[patch] += 1;
+            let direct = rgb64(visit.direct);
+            walks.direct.sum[patch] += direct;
+            walks.direct.squares += direct.element_sum().powi(2);
+            walks.stray[patch] += rgb64(visit.stray);
         }
+        let term = |t: &trace::Term| Term {
+            from: from[t.from as usize],
+            to: patch_at(&t.to),
+            weight: t.weight,
+            lit: t.lit,
+        };
+        walks.terms = traces.terms.par_iter().map(term).collect();
         walks.terms.par_sort_by_key(|t| t.from);
         let start = |i: u32| walks.terms.partition_point(|t| t.from < i) as u32;
-        walks.first = (0..=mesh.len() as u32).into_par_iter().map(start).collect();
+        walks.first = (0..=walks.leaf.len() as u32)
+            .into_par_iter()
+            .map(start)
+            .collect();
         walks
-    }
-
-    /// Gives how many edges that are.
-    fn add(&mut self, found: Vec<Walk>) -> u64 {
-        let mut edges = 0;
-        for walk in found {
-            for visit in &walk.visits {
-                let patch = visit.patch as usize;
-                self.visits[patch] += 1;
-                let direct = rgb64(visit.direct);
-                self.direct.sum[patch] += direct;
-                self.direct.squares += direct.element_sum().powi(2);
-                self.stray[patch] += rgb64(visit.stray);
-            }
-            edges += walk.visits.len() as u64;
-            self.terms.extend(walk.terms);
-        }
-        edges
     }
 
     /// Patches that walks met.
@@ -163,13 +111,19 @@ impl Walks {
         patches.filter(|i| met[*i as usize]).collect()
     }
 
-    /// What arrives if patches have `irradiance` (by patch).
+    /// To be told, by patch, before it is asked what arrives: irradiance straight from emitters, in W/m².
+    pub fn set_straight(&mut self, straight: Vec<Rgb64>) {
+        self.straight = straight;
+    }
+
+    /// What arrives if patches have `irradiance` (by patch). What comes straight from emitters counts as it does at
+    /// the very points that edges lead to: the mean over a patch that lies partly in a shadow would light what casts it.
     pub fn arriving(&self, irradiance: &[Rgb64]) -> Arrived {
         let of = |patch: usize| {
             let range = self.first[patch] as usize..self.first[patch + 1] as usize;
             let (mut sum, mut squares) = (self.stray[patch], 0.0);
             for t in &self.terms[range] {
-                let e = Rgb64::from_array(t.weight.map(f64::from)) * irradiance[t.to as usize];
+                let e = self.brought(t, irradiance);
                 sum += e;
                 squares += e.element_sum().powi(2);
             }
@@ -179,6 +133,19 @@ impl Walks {
         Arrived {
             squares: found.iter().map(|f| f.1).sum(),
             sum: found.into_iter().map(|f| f.0).collect(),
+        }
+    }
+
+    /// Irradiance that an edge brings.
+    fn brought(&self, t: &Term, irradiance: &[Rgb64]) -> Rgb64 {
+        let to = t.to as usize;
+        let weight = Rgb64::from_array(t.weight.map(f64::from));
+        match t.lit {
+            None => weight * irradiance[to],
+            Some(lit) => {
+                let reflected = (irradiance[to] - self.straight[to]).max(Rgb64::ZERO);
+                weight * reflected + Rgb64::from_array(lit.map(f64::from))
+            }
         }
     }
 
@@ -360,143 +327,5 @@ impl Sums {
         let scale = Rgb64::new(of(0), of(1), of(2));
         let more = (arrived - scale * self.linked).max(Rgb64::ZERO) / self.n;
         Gain { scale, more }
-    }
-}
-
-/// On its way.
-struct Walker<'a> {
-    scene: &'a Scene,
-    mesh: &'a PatchMesh,
-    gloss: Gloss,
-    sampler: Sampler,
-    /// Numbers that are used up.
-    blocks: u32,
-    walk: Walk,
-}
-
-impl Walker<'_> {
-    fn numbers(&mut self) -> [f32; 4] {
-        self.blocks += 1;
-        self.sampler.get4(self.blocks)
-    }
-
-    /// From `hit` on patch `from`.
-    fn walk(mut self, mut from: u32, mut hit: Hit) -> Walk {
-        for _ in 0..LONGEST {
-            let sampled = lit_straight(self.scene, &hit, self.numbers());
-            let [u, v, ..] = self.numbers();
-            let wi = direction(&hit, Vec2::new(u, v));
-            let (shown, next) = self.follow(from, hit, wi);
-            self.walk.visits.push(Visit {
-                patch: from,
-                direct: sampled + shown.straight,
-                stray: shown.stray,
-            });
-            match next {
-                Some(next) => (from, hit) = next,
-                None => break,
-            }
-        }
-        self.walk
-    }
-
-    /// Looks along `wi` from `hit` on patch `from`, by what mirrors and glass show: gives the emitters that are seen, and
-    /// the first diffuse surface.
-    fn follow(&mut self, from: u32, mut hit: Hit, mut wi: Vec3) -> (Shown, Option<(u32, Hit)>) {
-        let (origin, density) = (hit, Density::PerSr(front(&hit).dot(wi) / PI));
-        let (mut next, mut shown) = (None, Shown::default());
-        let (mut throughput, mut bent) = (Rgb::WHITE, false);
-        for _ in 0..PASSES {
-            let met = self.scene.intersect(&hit.spawn(wi));
-            let le = match &met {
-                Some(met) => self.scene.le(met),
-                None => self.scene.le_escaped(wi),
-            };
-            if !le.is_black() {
-                let lit = throughput * le * PI;
-                match (bent, &met) {
-                    (true, _) => shown.stray += lit,
-                    (false, Some(met)) => {
-                        let rival = self.scene.pdf_light(&origin, met);
-                        shown.straight += lit * density.mis_weight(rival);
-                    }
-                    (false, None) => {
-                        let rival = self.scene.pdf_light_escaped(&origin, wi);
-                        shown.straight += lit * density.mis_weight(rival);
-                    }
-                }
-            }
-            let Some(met) = met else {
-                break;
-            };
-            hit = met;
-            let [u, v, lobe, mixed] = self.numbers();
-            let shading = self.scene.shade(&hit, mixed);
-            let diffuse = shading.diffuse_share();
-            let found = match diffuse.is_black() {
-                true => None,
-                false => self.mesh.locate(&hit),
-            };
-            if let Some(at) = found {
-                self.walk.terms.push(Term {
-                    from,
-                    to: at.patch,
-                    weight: (throughput * diffuse).to_array(),
-                });
-                next = next.or(Some((at.patch, hit)));
-            }
-            let Some(rest) = shading.without_diffuse() else {
-                break;
-            };
-            let straight = matches!(rest.bsdf, Bsdf::Null(_));
-            if self.gloss == Gloss::LeftOut && !straight {
-                break;
-            }
-            let Some(sample) = rest.sample(lobe, Vec2::new(u, v), Mode::Radiance) else {
-                break;
-            };
-            bent |= !straight;
-            throughput *= sample.weight;
-            wi = sample.wi;
-        }
-        if self.gloss != Gloss::All || !shown.stray.is_finite() {
-            shown.stray = Rgb::BLACK;
-        }
-        (shown, next)
-    }
-}
-
-/// Irradiance in W/m² by the emitters that an edge sees: straight, where these cannot be sampled as well, and by
-/// mirrors, glass and gloss.
-#[derive(Default)]
-struct Shown {
-    straight: Rgb,
-    stray: Rgb,
-}
-
-/// One sample of the irradiance at `hit` straight from emitters, in W/m², where edges do not see them as well.
-fn lit_straight(scene: &Scene, hit: &Hit, [u, v, pick, _]: [f32; 4]) -> Rgb {
-    let Some(sample) = scene.sample_light(hit, pick, Vec2::new(u, v)) else {
-        return Rgb::BLACK;
-    };
-    let (cos, weight) = (front(hit).dot(sample.wi), sample.weight());
-    if cos <= 0.0 || weight.is_black() {
-        return Rgb::BLACK;
-    }
-    let passes = scene.transmittance(&sample.shadow_ray(hit), PASSES);
-    let lit = weight * (cos * passes * sample.density.mis_weight(cos / PI));
-    if lit.is_finite() { lit } else { Rgb::BLACK }
-}
-
-/// A direction away from the front that `hit` is seen from, by its cosine.
-pub fn direction(hit: &Hit, u: Vec2) -> Vec3 {
-    Frame::from_normal(front(hit)).to_world(warp::cosine_hemisphere(u))
-}
-
-/// The normal on the side that `hit` is seen from.
-fn front(hit: &Hit) -> Vec3 {
-    match hit.ng.dot(hit.wo) < 0.0 {
-        true => -hit.ng,
-        false => hit.ng,
     }
 }
