@@ -119,6 +119,10 @@ pub struct SolveSpec {
     pub max_edges: Option<u32>,
     /// Cut patches along the edges of shadows.
     pub discontinuities: bool,
+    /// Let patches of the hierarchical solver end where other surfaces touch or pass through them, so that a wall
+    /// parts what lies on both of its sides. Scenes of very many facets are left as they are; so are some facets that
+    /// too many others touch.
+    pub contacts: bool,
     /// Curved shapes differ from their facets by at most this share of their radius.
     pub curve_error: f64,
     /// What becomes of light that surfaces scatter in other ways than diffusely.
@@ -148,6 +152,7 @@ impl Default for SolveSpec {
             walks: 1 << 20,
             max_edges: None,
             discontinuities: false,
+            contacts: false,
             curve_error: 0.02,
             gloss: Gloss::LeftOut,
             lit_only: false,

@@ -67,6 +67,16 @@ impl Limits {
     };
 }
 
+impl Limits {
+    /// Only where surfaces touch.
+    pub const CONTACTS: Limits = Limits {
+        facets: 2000,
+        contacts: 200,
+        smallest: 0.5,
+        ..Limits::NONE
+    };
+}
+
 impl Default for Limits {
     fn default() -> Limits {
         Limits {

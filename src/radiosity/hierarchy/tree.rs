@@ -94,6 +94,9 @@ pub struct Tree {
 /// Patches to begin with that lines are cut for where no size is given.
 const PATCHES_ALONG_LINES: u64 = 2_000;
 
+/// More facets are not searched for contacts where that is all that is wanted: it takes each pair of them.
+const MOST_TOUCHING: usize = 20_000;
+
 /// The cells of all facets.
 fn divided(scene: &Scene, surfaces: &Surfaces, spec: &SolveSpec) -> Result<Divisions, SolveError> {
     let size = spec.patch_size.unwrap_or(f64::INFINITY);
@@ -105,12 +108,18 @@ fn divided(scene: &Scene, surfaces: &Surfaces, spec: &SolveSpec) -> Result<Divis
         false => Ok(()),
     };
     check(mesh::count(surfaces, size))?;
-    let (along, limits) = match spec.discontinuities {
-        true => {
+    let contacts = spec.contacts && surfaces.facets().len() <= MOST_TOUCHING;
+    let limits = match spec.discontinuities {
+        true => Limits::default(),
+        false if contacts => Limits::CONTACTS,
+        false => Limits::NONE,
+    };
+    let along = match limits == Limits::NONE {
+        true => size,
+        false => {
             let fine = || mesh::size_for(surfaces, PATCHES_ALONG_LINES);
-            (spec.patch_size.unwrap_or_else(fine), Limits::default())
+            spec.patch_size.unwrap_or_else(fine)
         }
-        false => (size, Limits::NONE),
     };
     let divisions = discontinuity::divisions(scene, surfaces, [size, along], &limits);
     check(divisions.pieces.len() as u64)?;
@@ -147,7 +156,10 @@ impl Tree {
             by_cluster,
             surfaces,
             divisions,
-            left_out: found.warnings(),
+            left_out: match spec.discontinuities {
+                true => found.warnings(),
+                false => Vec::new(),
+            },
             cells,
             nodes,
             patches: pieces.len() as u64,

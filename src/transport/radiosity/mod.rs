@@ -71,6 +71,7 @@ impl Default for CacheSpec {
                 error: GATHER_ERROR,
                 walks: CACHE_WALKS,
                 lit_only: true,
+                contacts: true,
                 residual: CACHE_RESIDUAL,
                 gloss: Gloss::All,
                 ..SolveSpec::default()
