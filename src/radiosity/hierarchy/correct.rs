@@ -46,7 +46,7 @@ pub fn correct(
     let irradiance = std::mem::take(&mut field.irradiance);
     let mut reflected = Field::reflected(tree, direct.clone(), irradiance);
     reflected.prepare(tree, parts);
-    let (mut prior, mut settled, mut grows) = (None, false, false);
+    let (mut spread, mut settled, mut grows) = (None, false, false);
     for step in 1..=spec.max_steps.unwrap_or(super::MAX_STEPS) {
         let linked = reflected.gather(tree, parts);
         // Bright rooms take many steps, of which gains need few.
@@ -54,9 +54,9 @@ pub fn correct(
         if looks {
             let [by_links, irradiance] = by_patch(tree, parts, &reflected, &walks, &met, &linked);
             let arriving = walks.arriving(&irradiance);
-            let known = prior.filter(|_| step > OFTEN);
+            let known = spread.filter(|_| step > OFTEN);
             let (gains, used) = walks.gains(tree, &order, &arriving, &by_links, known);
-            prior = Some(used);
+            spread = Some(used);
             for (&node, gain) in order.nodes.iter().zip(gains) {
                 tree.nodes[node as usize].gain = gain;
             }
@@ -83,7 +83,7 @@ pub fn correct(
     let linked = reflected.gather(tree, parts);
     let [by_links, irradiance] = by_patch(tree, parts, &reflected, &walks, &met, &linked);
     let arriving = walks.arriving(&irradiance);
-    let (in_bodies, _) = walks.gains(tree, &Order::new(tree, None), &arriving, &by_links, prior);
+    let (in_bodies, _) = walks.gains(tree, &Order::new(tree, None), &arriving, &by_links, spread);
     if let Some(edges) = spec.max_edges.filter(|&e| u64::from(e) < report.steps) {
         reflected = edge_by_edge(tree, parts, &direct, edges);
     }

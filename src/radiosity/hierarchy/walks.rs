@@ -37,8 +37,8 @@ pub struct Walks {
 pub struct Arrived {
     /// Irradiance summed over the points, in W/m².
     pub sum: Vec<Rgb64>,
-    /// The square of the sum of its channels, summed over all points.
-    pub squares: f64,
+    /// The square of the sum of its channels, summed over the points.
+    pub squares: Vec<f64>,
 }
 
 /// An edge to a point of patch `to` brings `weight` times the irradiance there.
@@ -65,7 +65,7 @@ impl Walks {
             visits: vec![0; leaf.len()],
             direct: Arrived {
                 sum: vec![Rgb64::ZERO; leaf.len()],
-                squares: 0.0,
+                squares: vec![0.0; leaf.len()],
             },
             stray: vec![Rgb64::ZERO; leaf.len()],
             straight: vec![Rgb64::ZERO; leaf.len()],
@@ -79,7 +79,7 @@ impl Walks {
             walks.visits[patch] += 1;
             let direct = rgb64(visit.direct);
             walks.direct.sum[patch] += direct;
-            walks.direct.squares += direct.element_sum().powi(2);
+            walks.direct.squares[patch] += direct.element_sum().powi(2);
             walks.stray[patch] += rgb64(visit.stray);
         }
         let term = |t: &trace::Term| Term {
@@ -131,7 +131,7 @@ impl Walks {
         };
         let found: Vec<(Rgb64, f64)> = (0..self.leaf.len()).into_par_iter().map(of).collect();
         Arrived {
-            squares: found.iter().map(|f| f.1).sum(),
+            squares: found.iter().map(|f| f.1).collect(),
             sum: found.into_iter().map(|f| f.0).collect(),
         }
     }
@@ -150,22 +150,27 @@ impl Walks {
     }
 
     /// What makes of `linked`, what links bring to patches (by patch), what `arrived`: by node of `order`. What is
-    /// known of the node above weighs as much as `prior` points; `None`: as many as the gains themselves tell.
+    /// known of the node above weighs by how much gains of nodes differ from it: their relative variance `spread`; `None`: as the
+    /// gains themselves tell.
     pub fn gains(
         &self,
         tree: &Tree,
         order: &Order,
         arrived: &Arrived,
         linked: &[Rgb64],
-        prior: Option<f64>,
+        spread: Option<f64>,
     ) -> (Vec<Gain>, f64) {
         let mut sums = vec![Sums::default(); order.nodes.len()];
         for (patch, &visits) in self.visits.iter().enumerate().filter(|(_, n)| **n > 0) {
             let n = f64::from(visits);
+            let [sum, by_links] = [arrived.sum[patch], linked[patch]].map(Rgb64::element_sum);
             sums[order.number[self.leaf[patch] as usize] as usize].add(&Sums {
                 n,
                 arrived: arrived.sum[patch],
                 linked: linked[patch] * n,
+                within: (arrived.squares[patch] - sum * sum / n).max(0.0),
+                freedom: n - 1.0,
+                scale: n * by_links * by_links,
             });
         }
         // Nodes come before what they contain.
@@ -179,10 +184,18 @@ impl Walks {
                 sums[above].add(&below);
             }
         }
-        let prior = prior.unwrap_or_else(|| {
-            let with_parent = |i: usize| Some((&sums[i], &sums[above(i)?]));
-            let pairs = (0..sums.len()).filter_map(with_parent);
-            points_of_prior(sums.first(), arrived.squares, pairs)
+        // Of one point; where few are known, as around.
+        let mut variances = Vec::<f64>::with_capacity(sums.len());
+        for (i, sum) in sums.iter().enumerate() {
+            let around = above(i).map_or(f64::NAN, |above| variances[above]);
+            variances.push(sum.variance().unwrap_or(around));
+        }
+        let spread = spread.unwrap_or_else(|| {
+            let with_parent = |i: usize| {
+                let above = above(i)?;
+                Some((&sums[i], &sums[above], variances[above]))
+            };
+            spread_of_gains((0..sums.len()).filter_map(with_parent))
         });
         let mut out = vec![Gain::NONE; sums.len()];
         // What is thought to have arrived: of the root, what did.
@@ -196,6 +209,7 @@ impl Walks {
             // The parts of a body are not told apart.
             let inside = inside.filter(|c| *c != i);
             let mut whole = Rgb64::ZERO;
+            let prior = points_of_prior(variances[i], spread);
             for c in inside.clone() {
                 arrived[c] = sums[c].believed(&out[i], prior);
                 whole += arrived[c];
@@ -209,48 +223,41 @@ impl Walks {
                 }
             }
         }
-        (out, prior)
+        (out, spread)
     }
 }
 
-/// Variance over squared mean, of `n` numbers.
-fn relative_variance(sum: f64, squares: f64, n: f64) -> f64 {
-    squares * n / (sum * sum) - 1.0
-}
-
-/// How many points tell as much as the node above: the variance of one point over that of gains around the gain of
-/// the node above, both relative; of gains by the method of moments (DerSimonian & Laird 1986), from all nodes below
-/// `root` and what they are in. So good links stay what they are, and bad ones follow the walks.
-fn points_of_prior<'a>(
-    root: Option<&Sums>,
-    squares: f64,
-    nodes: impl Iterator<Item = (&'a Sums, &'a Sums)>,
-) -> f64 {
+/// How many points tell as much as the node above, by the relative variances of one point and of gains around the gain
+/// of the node above: so good links stay what they are, and bad ones follow the walks.
+fn points_of_prior(variance: f64, spread: f64) -> f64 {
     /// Bounds where chance rules.
     const FEWEST: f64 = 16.0;
     const MOST: f64 = 1e6;
-    let Some(root) = root.filter(|root| root.n > 0.0) else {
-        return MOST;
-    };
-    let variance = relative_variance(root.arrived.element_sum(), squares, root.n);
-    if !(variance.is_finite() && variance > 0.0) {
-        return MOST;
+    let points = variance / spread;
+    match points.is_nan() {
+        true => MOST,
+        false => points.clamp(FEWEST, MOST),
     }
+}
+
+/// Relative variance of gains around those of the nodes above, by the method of moments (DerSimonian & Laird 1986):
+/// of nodes, with what they are in and the relative variance of one point there.
+fn spread_of_gains<'a>(nodes: impl Iterator<Item = (&'a Sums, &'a Sums, f64)>) -> f64 {
     let (mut excess, mut weights) = (0.0, 0.0);
-    for (node, above) in nodes.filter(|(node, _)| node.n > 0.0) {
+    for (node, above, variance) in nodes.filter(|(node, _, _)| node.n > 0.0) {
         let expected =
             node.linked.element_sum() * above.arrived.element_sum() / above.linked.element_sum();
         let deviation = node.arrived.element_sum() / expected - 1.0;
+        let weight = node.n / variance;
         // Of what is hardly linked, gains say nothing; one far off does not rule over all.
-        if deviation.is_finite() {
-            let weight = node.n / variance;
+        if deviation.is_finite() && weight.is_finite() {
             excess += (weight * deviation.clamp(-1.0, 1.0).powi(2)) - 1.0;
             weights += weight;
         }
     }
     match excess > 0.0 {
-        true => (variance * weights / excess).clamp(FEWEST, MOST),
-        false => MOST,
+        true => excess / weights,
+        false => 0.0,
     }
 }
 
@@ -291,6 +298,12 @@ struct Sums {
     n: f64,
     arrived: Rgb64,
     linked: Rgb64,
+    /// Squares of what arrived at each point less the mean of its patch, of the sum of the channels; and how many of them
+    /// are independent.
+    within: f64,
+    freedom: f64,
+    /// Squares of what links bring to each point, of the sum of the channels.
+    scale: f64,
 }
 
 impl Sums {
@@ -298,6 +311,20 @@ impl Sums {
         self.n += o.n;
         self.arrived += o.arrived;
         self.linked += o.linked;
+        self.within += o.within;
+        self.freedom += o.freedom;
+        self.scale += o.scale;
+    }
+
+    /// Variance of what arrives at one point, relative to the square of what is expected there; `None` where too few
+    /// points tell.
+    fn variance(&self) -> Option<f64> {
+        /// Points by which a variance is known to about a third, if tails are not too heavy.
+        const ENOUGH: f64 = 16.0;
+        let gain = self.arrived.element_sum() / self.linked.element_sum();
+        let expected = gain * gain * self.scale / self.n;
+        let variance = self.within / self.freedom / expected;
+        (self.freedom >= ENOUGH && variance > 0.0 && variance.is_finite()).then_some(variance)
     }
 
     /// What arrived, as far as can be known by what was found here and by the gain of the node above.
