@@ -159,7 +159,7 @@ impl Default for SolveSpec {
 
 /// How far a solver has come; handed to an observer after each step.
 pub struct Progress<'a> {
-    /// From 1.
+    /// From 1; 0 while nothing is solved yet, and what emits is all that is bright. A step may be shown again.
     pub step: u64,
     pub mesh: &'a PatchMesh,
     /// Per patch, in W/m², without the ambient term.
@@ -352,7 +352,7 @@ pub fn solve(
                 let solver = spec.solver.name();
                 return Err(SolveError::Unbounded { solver });
             }
-            let doubts = report::doubts(&solution.report);
+            let doubts = report::doubts(&solution.report, spec.residual);
             solution.report.warnings.extend(doubts);
             Ok(solution)
         }

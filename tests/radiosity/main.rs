@@ -8,4 +8,5 @@ mod external;
 mod extremes;
 mod rooms;
 mod solvers;
+mod stopping;
 mod surfaces;

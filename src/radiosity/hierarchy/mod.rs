@@ -20,6 +20,7 @@ mod refine;
 mod sphere;
 mod tree;
 mod walks;
+mod watch;
 
 use super::{Progress, Report, Rgb64, Solution, SolveError, SolveSpec, Surfaces};
 use crate::scene::Scene;
@@ -30,6 +31,7 @@ use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
 use std::time::Instant;
 use tree::Tree;
+use watch::Watch;
 
 /// A cluster or a piece of surface.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,7 +77,8 @@ const BLACK: f64 = 1e-3;
 /// Gathering steps after the last refinement, at most, when no other limit is given.
 const MAX_STEPS: u64 = 10_000;
 
-/// The hierarchical solution of `scene`.
+/// The hierarchical solution of `scene`. Where it is stopped while links are made, those that are still to be divided
+/// stay as they are, and nothing is put right by walks.
 pub fn solve(
     scene: &Scene,
     surfaces: Arc<Surfaces>,
@@ -94,13 +97,14 @@ pub fn solve(
     let most = spec.max_steps.unwrap_or(MAX_STEPS);
     let mut too_much = 0.0;
     let mut parts = Parts::new(&tree);
+    let mut watch = Watch::new(observe);
     let looser = (LOOSEST / spec.error).log(STEP).floor() as i32;
     for looser in (0..=looser.clamp(0, LOOSER)).rev() {
         let clock = Instant::now();
         let error = spec.error * STEP.powi(looser);
         // What few links make dark may be brighter than it seems.
         let black = (BLACK * STEP.powi(looser)).min(0.25);
-        refiner.refine(&mut tree, &mut field, error, black);
+        refiner.refine(&mut tree, &mut field, error, black, &mut watch);
         if balance::keeps_all(scene, &tree, &field, spec.seed) {
             return Err(SolveError::NoAbsorption);
         }
@@ -110,32 +114,44 @@ pub fn solve(
         report.form_factor_seconds += clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         // Before the last refinement, it is enough to see where light goes.
+        let stopped = watch.is_stopped();
         let (wanted, until) = match looser {
-            0 if spec.walks == 0 => (spec.residual, most),
+            0 if spec.walks == 0 && !stopped => (spec.residual, most),
             _ => (spec.residual.max(0.02), most.min(report.steps + LOOKS)),
         };
         loop {
             report.residual =
                 field.step(&tree, &parts) / emitted.element_sum().max(f64::MIN_POSITIVE);
             report.steps += 1;
-            report.converged = looser == 0 && report.residual <= wanted;
+            report.converged = looser == 0 && !stopped && report.residual <= wanted;
             let growing = !report.residual.is_finite();
             if report.residual <= wanted || report.steps >= until || growing {
                 break;
             }
+            (watch.step, watch.residual) = (report.steps, report.residual);
+            if !stopped && watch.look(&tree, &field) {
+                break;
+            }
         }
+        (watch.step, watch.residual) = (report.steps, report.residual);
         field.spread(&tree, &parts, None);
         report.solve_seconds += clock.elapsed().as_secs_f64();
-        if looser == 0 || report.steps >= most {
+        if looser == 0 || report.steps >= most || watch.is_stopped() {
             break;
         }
-        if observes(&tree, &field, &report, observe).is_break() {
+        watch.show(&tree, &field);
+        if watch.is_stopped() {
             break;
         }
     }
+    if watch.is_stopped() {
+        let said =
+            "stopped before all links were as good as was asked for: light is found only roughly";
+        report.warnings.push(said.to_string());
+    }
     report.links = tree.links();
     let mut direct = None;
-    if report.residual.is_finite() && spec.walks > 0 {
+    if report.residual.is_finite() && spec.walks > 0 && !watch.is_stopped() {
         let clock = Instant::now();
         direct = Some(correct::correct(
             scene,
@@ -144,7 +160,7 @@ pub fn solve(
             &mut field,
             spec,
             &mut report,
-            observe,
+            watch.observe,
         ));
         report.solve_seconds += clock.elapsed().as_secs_f64();
     }
@@ -167,7 +183,7 @@ pub fn solve(
         ambient: Rgb64::ZERO,
         residual: solution.report.residual,
     };
-    let _ = observe(&last);
+    let _ = (watch.observe)(&last);
     Ok(solution)
 }
 
