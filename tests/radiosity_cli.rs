@@ -112,6 +112,29 @@ fn writes_a_mesh_to_the_current_folder_if_nothing_is_said() {
 }
 
 #[test]
+fn the_result_is_told_without_progress() {
+    let folder = folder("quiet");
+    let output = luxel(
+        &folder,
+        &[
+            "radiosity",
+            "room.xml",
+            "--error",
+            "1e-2",
+            "--walks",
+            "0",
+            "--exposure",
+            "0.05",
+            "--progress",
+            "never",
+        ],
+    );
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert!(text(&output.stdout).contains("residual"));
+    assert_eq!(text(&output.stderr), "wrote room.glb\n");
+}
+
+#[test]
 fn pictures_of_steps_become_the_picture_of_the_result() {
     let folder = folder("snapshots");
     let mean = |name: &str| {

@@ -203,9 +203,7 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
         );
         image_io::write_atomic(path, text.as_bytes())?;
     }
-    if args.progress != ProgressMode::Never {
-        eprintln!("{}", summary(&film, &stats, &outputs));
-    }
+    eprintln!("{}", summary(&film, &stats, &outputs));
     report_invalid(&stats);
     Ok(if stopped.load(Ordering::Relaxed) {
         Outcome::Interrupted
