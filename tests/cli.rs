@@ -194,6 +194,7 @@ fn a_wrong_command_line_exits_with_2() {
     folder.write("small.xml", SMALL);
     for args in [
         &["render", "small.xml", "--spp", "0"][..],
+        &["render", "small.xml", "--spp", "-1"],
         &["render", "small.xml", "--spp", "4", "--time", "1s"],
         &["render", "small.xml", "--resolution", "20"],
         &["render", "small.xml", "--time", "5 parsecs"],
