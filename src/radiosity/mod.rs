@@ -186,7 +186,7 @@ pub struct Report {
     pub external: Rgb64,
     /// Taken in by surfaces, and lost from the scene: together what was emitted, up to the residual. What is lost
     /// is what patches give less what patches get, so that it has the error of the form factors: it may be
-    /// somewhat below 0 in a closed scene.
+    /// somewhat below 0 in a closed scene. What goes through masks is neither there.
     pub absorbed: Rgb64,
     pub escaped: Rgb64,
     /// Share of the light that arrives at patches that they scatter in ways which radiosity leaves out.

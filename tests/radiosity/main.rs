@@ -6,6 +6,7 @@ mod render;
 
 mod external;
 mod extremes;
+mod masks;
 mod rooms;
 mod solvers;
 mod stopping;

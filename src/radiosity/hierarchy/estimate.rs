@@ -154,9 +154,7 @@ fn visibility(scene: &Scene, hit: &Hit, ends: &[Hit; 4], first: usize, rays: usi
         }
         let weight = (ca / d2) * (cb / d2);
         sent += weight;
-        if !blocked(scene, hit, &Endpoint::from(end)) {
-            arrived += weight;
-        }
+        arrived += weight * passed(scene, hit, &Endpoint::from(end));
         traced += 1;
         if traced == rays {
             break;
@@ -165,9 +163,13 @@ fn visibility(scene: &Scene, hit: &Hit, ends: &[Hit; 4], first: usize, rays: usi
     (sent > 0.0).then(|| arrived / sent)
 }
 
-fn blocked(scene: &Scene, from: &Hit, to: &Endpoint) -> bool {
+/// Share of light that arrives.
+fn passed(scene: &Scene, from: &Hit, to: &Endpoint) -> f64 {
     let ray = from.spawn_to(to);
-    ray.t_max <= 0.0 || scene.transmittance(&ray, PASSES) < 0.5
+    match ray.t_max > 0.0 {
+        true => f64::from(scene.transmittance(&ray, PASSES)),
+        false => 0.0,
+    }
 }
 
 /// Surfaces that a ray may pass through.
@@ -190,9 +192,7 @@ fn between_clusters(scene: &Scene, tree: &Tree, r: u32, s: u32) -> Option<Estima
         free += kernel;
         most = most.max(kernel);
         let hit = |at: &Point| on_facet(scene, &tree.surfaces, at.facet, &at.piece, at.st);
-        if !blocked(scene, &hit(&a), &Endpoint::from(&hit(&b))) {
-            arrived += kernel;
-        }
+        arrived += kernel * passed(scene, &hit(&a), &Endpoint::from(&hit(&b)));
     }
     if free == 0.0 {
         // What so many pairs did not find is little.
