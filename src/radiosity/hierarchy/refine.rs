@@ -251,7 +251,7 @@ impl<'a> Refiner<'a> {
             };
         }
         let fine = most > threshold;
-        let Some(found) = estimate(self.scene, tree, r, s, fine) else {
+        let Some(found) = estimate(self.scene, tree, &field.radiosity, (r, s), fine) else {
             return Fate::Dropped;
         };
         let errors = errors(tree, field, r, s, &found);
@@ -334,7 +334,7 @@ impl<'a> Refiner<'a> {
         let node = if sender { s } else { r };
         if !tree.divide(self.scene, node, self.min_size) {
             // Patches ran out while the pairs were looked at.
-            if let Some(found) = estimate(self.scene, tree, r, s, true) {
+            if let Some(found) = estimate(self.scene, tree, &field.radiosity, (r, s), true) {
                 tree.nodes[r as usize].links.push(TreeLink {
                     sender: s,
                     form_factor: found.form_factor as f32,
