@@ -443,3 +443,41 @@ fn the_scene_language_and_the_command_line_ask_for_it() {
     let view = render::compile_with(&room(LAMP), &overrides(Some("radiosity"), None));
     assert_eq!(view.job.integrator.name(), "radiosity");
 }
+
+/// What the scene says of a solution holds whether it or the command line asks for one.
+#[test]
+fn settings_of_the_scene_meet_the_way_of_the_command_line() {
+    let solved = |kind: &str, params: &str, indirect: &str| {
+        let integrator = format!(
+            r#"<integrator type="{kind}"><integer name="max_depth" value="-1"/>{params}</integrator>"#
+        );
+        let overrides = Overrides {
+            indirect: Some(indirect.to_string()),
+            ..Overrides::default()
+        };
+        let scene = room(LAMP);
+        let (start, end) = (scene.find("<integrator"), scene.find("</integrator>"));
+        let rest = &scene[end.unwrap() + "</integrator>".len()..];
+        let scene = format!("{}{integrator}{rest}", &scene[..start.unwrap()]);
+        let mut spec = render::compile_with(&scene, &overrides).job.integrator;
+        let cache = spec.cache().unwrap();
+        assert_eq!(cache.indirect.name(), indirect);
+        spec.solve().cloned()
+    };
+    let walks = r#"<integer name="walks" value="65536"/>"#;
+    let gather = r#"<string name="indirect" value="gather"/>"#;
+    let error = r#"<float name="error" value="0.003"/>"#;
+    for kind in ["path", "combined"] {
+        for before in ["", gather] {
+            for (indirect, usual) in [(Indirect::Gather, 1e-2), (Indirect::Guide, 1e-4)] {
+                let with = |params: String| solved(kind, &params, indirect.name()).unwrap();
+                let found = with(format!("{before}{walks}"));
+                assert_eq!((found.walks, found.error), (65_536, usual), "{kind}");
+                let found = with(format!("{before}{walks}{error}"));
+                assert_eq!((found.walks, found.error), (65_536, 0.003), "{kind}");
+            }
+        }
+        let none = solved(kind, walks, "none");
+        assert_eq!(none.is_some(), kind == "combined");
+    }
+}

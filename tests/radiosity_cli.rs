@@ -112,6 +112,29 @@ fn writes_a_mesh_to_the_current_folder_if_nothing_is_said() {
 }
 
 #[test]
+fn the_result_is_told_without_progress() {
+    let folder = folder("quiet");
+    let output = luxel(
+        &folder,
+        &[
+            "radiosity",
+            "room.xml",
+            "--error",
+            "1e-2",
+            "--walks",
+            "0",
+            "--exposure",
+            "0.05",
+            "--progress",
+            "never",
+        ],
+    );
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert!(text(&output.stdout).contains("residual"));
+    assert_eq!(text(&output.stderr), "wrote room.glb\n");
+}
+
+#[test]
 fn pictures_of_steps_become_the_picture_of_the_result() {
     let folder = folder("snapshots");
     let mean = |name: &str| {
@@ -152,7 +175,7 @@ fn pictures_of_steps_become_the_picture_of_the_result() {
 #[test]
 fn tells_what_is_wrong_and_with_what() {
     let folder = folder("errors");
-    let cases: [(&[&str], i32, &str); 10] = [
+    let cases: [(&[&str], i32, &str); 14] = [
         (
             &["-o", "a.stl"],
             2,
@@ -186,6 +209,18 @@ fn tells_what_is_wrong_and_with_what() {
             "--samples has no effect with form factors by hemicube",
         ),
         (&["--patch-size", "0"], 2, "expected a number above zero"),
+        (&["--patch-size", "-1"], 2, "expected a number above zero"),
+        (
+            &["--walks", "-5"],
+            2,
+            "expected a whole number from 0 to 67108864",
+        ),
+        (
+            &["--max-steps", "-1"],
+            2,
+            "expected a whole number of at least 1",
+        ),
+        (&["--error", "--walks", "0"], 2, "a value is required"),
         (&["--no-ambient"], 2, "--snapshots"),
         (&["-o", "none/a.glb"], 3, "cannot write none/a.glb"),
         (&["-D", "bsdf=conductor", "-D", "x=1"], 1, "x"),

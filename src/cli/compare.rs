@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
+use super::numbers::{positive, whole};
 use super::{Failure, Outcome};
 use crate::image_io::Image;
 use crate::study::Picture;
@@ -33,13 +34,13 @@ pub struct CompareArgs {
     #[arg(long, value_name = "FILE")]
     pub reference_variance: Option<PathBuf>,
     /// Samples per pixel of IMAGE
-    #[arg(long, value_name = "N", value_parser = positive, requires = "reference_variance")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = positive, requires = "reference_variance")]
     pub spp: Option<f64>,
     /// What the variance file holds
     #[arg(long, value_enum, default_value_t, requires = "reference_variance")]
     pub kind: Kind,
     /// Samples per pixel of REFERENCE [default for --kind sample: 32000]
-    #[arg(long, value_name = "N", value_parser = positive, requires = "reference_variance")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = positive, requires = "reference_variance")]
     pub reference_spp: Option<f64>,
     /// Variance of the mean in IMAGE, as an EXR (with --kind mean, instead of --spp)
     #[arg(
@@ -53,7 +54,7 @@ pub struct CompareArgs {
     #[arg(long, conflicts_with = "reference_variance")]
     pub stderr: bool,
     /// Average blocks of N x N pixels before the Z-test [default: 1 with --kind sample, else 4]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=usize::MAX))]
     pub block: Option<usize>,
     /// Print the figures as JSON
     #[arg(long)]
@@ -63,7 +64,7 @@ pub struct CompareArgs {
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// Error of luminance at the ends of the colour bar [default: from the errors]
-    #[arg(long, value_name = "X", value_parser = positive, requires = "output")]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive, requires = "output")]
     pub error_scale: Option<f64>,
 }
 
@@ -75,13 +76,6 @@ pub enum Kind {
     Sample,
     /// Variance of the reference itself, per channel
     Mean,
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(v) if v > 0.0 && v.is_finite() => Ok(v),
-        _ => Err("not a number above zero".to_string()),
-    }
 }
 
 /// Runs the command and prints its findings.

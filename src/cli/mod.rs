@@ -3,6 +3,7 @@
 
 pub mod compare;
 mod info;
+mod numbers;
 mod progress;
 mod radiosity;
 mod render;

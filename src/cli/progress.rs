@@ -12,7 +12,7 @@ use crate::render::{Stats, Stop, percent};
 pub enum ProgressMode {
     /// A bar on a terminal, plain lines elsewhere
     Auto,
-    /// Nothing
+    /// Nothing on the way: only the result, and warnings
     Never,
 }
 

@@ -10,6 +10,7 @@ use clap::Args;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde_json::json;
 
+use super::numbers::whole;
 use super::progress::{Progress, ProgressMode, human_seconds};
 use super::{Failure, Outcome};
 use crate::film::{Film, Window};
@@ -36,16 +37,16 @@ pub struct RenderArgs {
     #[arg(long, value_name = "NAME")]
     pub sampler: Option<String>,
     /// Samples per pixel [default: what the scene's sampler says, else 4]
-    #[arg(long, value_name = "N", conflicts_with = "time", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", conflicts_with = "time", allow_negative_numbers = true, value_parser = whole(1..=u64::MAX))]
     pub spp: Option<u64>,
     /// Render for this long: 500ms, 90s, 5m, 1h; at least one sample per pixel is taken
-    #[arg(long, value_name = "TIME", value_parser = parse_duration)]
+    #[arg(long, value_name = "TIME", allow_negative_numbers = true, value_parser = parse_duration)]
     pub time: Option<Duration>,
     /// Seed of the random numbers [default: that of the scene's sampler, else 0]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(0..=u64::MAX))]
     pub seed: Option<u64>,
     /// Threads to render with [default: one per processor]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=u16::MAX))]
     pub threads: Option<u16>,
     /// Size of the full picture, in pixels
     #[arg(long, value_name = "WxH", value_parser = parse_resolution)]
@@ -54,7 +55,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "X,Y,W,H", value_parser = parse_window)]
     pub crop: Option<Window>,
     /// Longest path: 1 shows emitters only, 2 adds direct light, -1 sets no limit
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(i64).range(-1..=1_000_000))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(-1..=1_000_000i64))]
     pub max_depth: Option<i64>,
     /// Set a parameter of the scene that it names with <default>
     #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = parse_define)]
@@ -203,9 +204,7 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
         );
         image_io::write_atomic(path, text.as_bytes())?;
     }
-    if args.progress != ProgressMode::Never {
-        eprintln!("{}", summary(&film, &stats, &outputs));
-    }
+    eprintln!("{}", summary(&film, &stats, &outputs));
     report_invalid(&stats);
     Ok(if stopped.load(Ordering::Relaxed) {
         Outcome::Interrupted

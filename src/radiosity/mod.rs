@@ -164,7 +164,7 @@ impl Default for SolveSpec {
 
 /// How far a solver has come; handed to an observer after each step.
 pub struct Progress<'a> {
-    /// From 1.
+    /// From 1; 0 while nothing is solved yet, and what emits is all that is bright. A step may be shown again.
     pub step: u64,
     pub mesh: &'a PatchMesh,
     /// Per patch, in W/m², without the ambient term.
@@ -191,7 +191,7 @@ pub struct Report {
     pub external: Rgb64,
     /// Taken in by surfaces, and lost from the scene: together what was emitted, up to the residual. What is lost
     /// is what patches give less what patches get, so that it has the error of the form factors: it may be
-    /// somewhat below 0 in a closed scene.
+    /// somewhat below 0 in a closed scene. What goes through masks is neither there.
     pub absorbed: Rgb64,
     pub escaped: Rgb64,
     /// Share of the light that arrives at patches that they scatter in ways which radiosity leaves out.
@@ -357,7 +357,7 @@ pub fn solve(
                 let solver = spec.solver.name();
                 return Err(SolveError::Unbounded { solver });
             }
-            let doubts = report::doubts(&solution.report);
+            let doubts = report::doubts(&solution.report, spec.residual);
             solution.report.warnings.extend(doubts);
             Ok(solution)
         }

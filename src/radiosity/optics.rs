@@ -2,6 +2,7 @@
 
 use super::Rgb64;
 use super::piece::Outline;
+use crate::bsdf::Bsdf;
 use crate::geom::Hit;
 use crate::math::{DVec2, Rgb};
 use crate::scene::Scene;
@@ -14,6 +15,8 @@ pub struct Optics {
     pub albedo: Rgb64,
     /// Share of light from the normal's direction that is scattered in other ways: by mirrors, gloss, glass.
     pub other: Rgb64,
+    /// Share of light that goes straight on, as if there were nothing: by masks.
+    pub through: Rgb64,
     /// Of it, what surfaces scatter that light does not pass through.
     pub gloss: Rgb64,
     /// Exitance of the emitter that the surface is, in W/m².
@@ -28,10 +31,15 @@ pub fn at(scene: &Scene, hit: &Hit, u: f32) -> Optics {
         true => shading.bsdf.diffuse_albedo(),
         false => Rgb::BLACK,
     };
-    let other = rgb64(shading.albedo() - albedo).max(Rgb64::ZERO);
+    let through = match shading.bsdf {
+        Bsdf::Null(null) => null.transmittance,
+        _ => Rgb::BLACK,
+    };
+    let other = rgb64(shading.albedo() - albedo - through).max(Rgb64::ZERO);
     Optics {
         albedo: rgb64(albedo).clamp(Rgb64::ZERO, Rgb64::ONE),
         other,
+        through: rgb64(through).clamp(Rgb64::ZERO, Rgb64::ONE),
         gloss: match seen && shading.bsdf.is_opaque() {
             true => other,
             false => Rgb64::ZERO,
@@ -61,6 +69,7 @@ pub fn mean(
         let one = self::at(scene, &hit, at(0.618_033_988_749_895) as f32);
         sum.albedo += one.albedo;
         sum.other += one.other;
+        sum.through += one.through;
         sum.gloss += one.gloss;
         sum.emission += one.emission;
     }
@@ -72,6 +81,7 @@ pub fn mean(
     Optics {
         albedo: ((sum.albedo + turned) * share).min(Rgb64::ONE),
         other: (sum.other - turned) * share,
+        through: sum.through * share,
         gloss: (sum.gloss - turned) * share,
         emission: sum.emission * share,
     }

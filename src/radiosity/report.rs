@@ -4,6 +4,7 @@ use super::surfaces::Surfaces;
 use super::{PatchMesh, Report, Rgb64, mesh};
 use crate::scene::Scene;
 use rayon::prelude::*;
+use std::cmp::Ordering;
 
 /// What the balance is made of.
 pub(super) struct Balance<'a> {
@@ -35,32 +36,56 @@ pub(super) fn of(scene: &Scene, balance: &Balance) -> Report {
         report.external += external * patch.area;
         report.absorbed += (Rgb64::ONE - patch.albedo) * irradiance * patch.area;
     }
-    report.other = other(scene, balance);
+    let lost = NotAbsorbed::of(scene, balance);
+    report.other = lost.other_share();
+    report.absorbed -= lost.through;
+    // Patches have not got it after all.
+    report.escaped += lost.through;
     report.warnings = warnings(&balance.mesh.surfaces, &report);
     report
 }
 
-/// Share of the arriving light that is scattered, but not diffusely.
-fn other(scene: &Scene, balance: &Balance) -> f64 {
-    let mesh = balance.mesh;
-    let scattered = |(patch, &irradiance): (&super::Patch, &Rgb64)| {
-        let optics = mesh::of_piece(scene, &mesh.surfaces, patch.facet, &patch.piece);
-        let arriving = irradiance * patch.area;
-        [
-            (optics.other * arriving).element_sum(),
-            arriving.element_sum(),
-        ]
-    };
-    let parts: Vec<[f64; 2]> = mesh
-        .patches
-        .par_iter()
-        .zip(balance.irradiance)
-        .map(scattered)
-        .collect();
-    let [other, all] = parts
-        .into_iter()
-        .fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
-    if all > 0.0 { other / all } else { 0.0 }
+/// Light that arrives at patches, and what becomes of it but to be absorbed or reflected diffusely.
+#[derive(Clone, Copy, Default)]
+struct NotAbsorbed {
+    /// W, summed over the channels.
+    arriving: f64,
+    /// The same, of what is scattered, but not diffusely.
+    other: f64,
+    /// W that go through masks.
+    through: Rgb64,
+}
+
+impl NotAbsorbed {
+    fn of(scene: &Scene, balance: &Balance) -> NotAbsorbed {
+        let mesh = balance.mesh;
+        let one = |(patch, &irradiance): (&super::Patch, &Rgb64)| {
+            let optics = mesh::of_piece(scene, &mesh.surfaces, patch.facet, &patch.piece);
+            let arriving = irradiance * patch.area;
+            NotAbsorbed {
+                arriving: arriving.element_sum(),
+                other: (optics.other * arriving).element_sum(),
+                through: optics.through * arriving,
+            }
+        };
+        let patches = mesh.patches.par_iter().zip(balance.irradiance);
+        let parts: Vec<NotAbsorbed> = patches.map(one).collect();
+        let mut sum = NotAbsorbed::default();
+        for part in parts {
+            sum.arriving += part.arriving;
+            sum.other += part.other;
+            sum.through += part.through;
+        }
+        sum
+    }
+
+    /// Share of the arriving light.
+    fn other_share(&self) -> f64 {
+        match self.arriving > 0.0 {
+            true => self.other / self.arriving,
+            false => 0.0,
+        }
+    }
 }
 
 /// What the user should know of the scene.
@@ -101,10 +126,11 @@ fn warnings(surfaces: &Surfaces, report: &Report) -> Vec<String> {
     warnings
 }
 
-/// What the user should know of a solution by links: that it is not done, or has more light than there can be.
-pub(super) fn doubts(report: &Report) -> Vec<String> {
+/// What the user should know of a solution by links: that it is not done, or has more light than there can be. `asked`
+/// is the residual that was asked for.
+pub(super) fn doubts(report: &Report, asked: f64) -> Vec<String> {
     let mut doubts = Vec::new();
-    if !report.converged {
+    if !report.converged && report.residual.partial_cmp(&asked) != Some(Ordering::Less) {
         doubts.push(format!(
             "the solver stopped after {} steps with a residual of {:.2e}, which is more than was asked for",
             report.steps, report.residual
@@ -112,7 +138,7 @@ pub(super) fn doubts(report: &Report) -> Vec<String> {
     }
     let given = (report.emitted + report.external).element_sum();
     let absorbed = report.absorbed.element_sum();
-    // What passes through masks counts as absorbed; and what still grows says nothing.
+    // What is scattered in other ways counts as absorbed wherever it arrives; and what still grows says nothing.
     if report.converged && report.other <= NEGLIGIBLE && absorbed > given * (1.0 + MADE) {
         doubts.push(format!(
             "patches absorb {:.3} times the light that there is: surfaces that coincide, or lights much smaller \
@@ -144,11 +170,11 @@ mod tests {
             other,
             ..Report::default()
         };
-        assert!(doubts(&report(true, 1.05, 0.0)).is_empty());
-        assert!(doubts(&report(true, 1.5, 0.4)).is_empty());
-        let made = doubts(&report(true, 1.5, 0.0));
+        assert!(doubts(&report(true, 1.05, 0.0), 0.0).is_empty());
+        assert!(doubts(&report(true, 1.5, 0.4), 0.0).is_empty());
+        let made = doubts(&report(true, 1.5, 0.0), 0.0);
         assert!(matches!(&made[..], [one] if one.contains("1.500 times")));
-        let stopped = doubts(&report(false, 1.5, 0.0));
+        let stopped = doubts(&report(false, 1.5, 0.0), 0.0);
         assert!(matches!(&stopped[..], [one] if one.contains("stopped after 0 steps")));
     }
 }

@@ -6,6 +6,9 @@ mod render;
 
 mod external;
 mod extremes;
+mod masks;
 mod rooms;
+mod sizes;
 mod solvers;
+mod stopping;
 mod surfaces;

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use crate::cli::Failure;
+use crate::cli::numbers::{positive, whole};
 use crate::cli::progress::ProgressMode;
 use crate::cli::render::parse_define;
 use crate::radiosity::export::{Shading, Up};
@@ -28,33 +29,33 @@ pub struct RadiosityArgs {
     pub form_factors: Option<Method>,
     /// Samples of each pair of patches, for form factors by montecarlo or analytic
     /// [default: what the scene's integrator says, else 16]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=1u32 << 20))]
     pub samples: Option<u32>,
     /// Pixels along the edge of a hemicube [default: what the scene's integrator says, else 128]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=4096))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(2..=4096u32))]
     pub resolution: Option<u32>,
     /// Longest edge of a patch, in scene units [default: what the scene's integrator says, else what gives about
     /// 2,000 patches, 10,000 for shooting; for hierarchical a part of the scene]
-    #[arg(long, value_name = "X", value_parser = parse_positive)]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive)]
     pub patch_size: Option<f64>,
     /// Shortest edge of a patch that the solver hierarchical makes, in scene units
-    #[arg(long, value_name = "X", value_parser = parse_positive)]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive)]
     pub min_size: Option<f64>,
     /// Greatest error of a link of the solver hierarchical, as a share of the light that is usual at its receiver, times the receiver's share of all area
     /// [default: what the scene's integrator says, else 1e-5]
-    #[arg(long, value_name = "X", value_parser = parse_positive)]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive)]
     pub error: Option<f64>,
     /// Edges of random walks by which the solver hierarchical corrects what links bring; 0: it trusts links; else at least 4096
     /// [default: what the scene's integrator says, else 1048576]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=1 << 26))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(0..=1u64 << 26))]
     pub walks: Option<u64>,
     /// Residual relative to the emitted power at which solving ends
     /// [default: what the scene's integrator says, else 1e-4]
-    #[arg(long, value_name = "X", value_parser = parse_positive)]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive)]
     pub residual: Option<f64>,
     /// Most steps: sweeps, or patches that shoot [default: what the scene's integrator says, else as many as the residual
     /// takes]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=u64::MAX))]
     pub max_steps: Option<u64>,
     /// Cut patches along the edges of shadows
     #[arg(long)]
@@ -70,17 +71,17 @@ pub struct RadiosityArgs {
     pub snapshots: Option<PathBuf>,
     /// Steps to write pictures of; the result is always one
     #[arg(long, value_name = "N,...", value_delimiter = ',', default_value = "1,20,250", requires = "snapshots",
-        value_parser = clap::value_parser!(u64).range(1..))]
+        allow_negative_numbers = true, value_parser = whole(1..=u64::MAX))]
     pub snapshot_steps: Vec<u64>,
     /// Samples per pixel of these pictures
     #[arg(long, value_name = "N", default_value_t = 16, requires = "snapshots",
-        value_parser = clap::value_parser!(u64).range(1..))]
+        allow_negative_numbers = true, value_parser = whole(1..=u64::MAX))]
     pub snapshot_spp: u64,
     /// Colours of the mesh and of snapshots: one per patch, or interpolated between vertices
     #[arg(long, value_enum, default_value_t = Show::Gouraud)]
     pub show: Show,
     /// Colours of the mesh are radiance times this; glTF has none above 1
-    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = parse_positive)]
+    #[arg(long, value_name = "X", default_value_t = 1.0, allow_negative_numbers = true, value_parser = positive)]
     pub exposure: f64,
     /// Which way is up in the scene: viewers of glTF want to know
     #[arg(long, value_enum, default_value_t = Axis::Y)]
@@ -89,7 +90,7 @@ pub struct RadiosityArgs {
     #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = parse_define)]
     pub define: Vec<(String, String)>,
     /// Threads to solve with [default: one per processor]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole(1..=u16::MAX))]
     pub threads: Option<u16>,
     /// How to show progress
     #[arg(long, value_enum, default_value_t = ProgressMode::Auto)]
@@ -137,13 +138,6 @@ fn parse_solver(text: &str) -> Result<Solver, String> {
     let known = Solver::ALL.map(Solver::name);
     let found = Solver::ALL.into_iter().find(|s| s.name() == text);
     found.ok_or_else(|| format!("expected one of {}", known.join(", ")))
-}
-
-fn parse_positive(text: &str) -> Result<f64, String> {
-    let number = text.parse::<f64>().ok();
-    number
-        .filter(|x| *x > 0.0 && x.is_finite())
-        .ok_or_else(|| "expected a number above zero".to_string())
 }
 
 /// Samples and resolution where nothing asks for others: those of the scene language.

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 use rayon::ThreadPool;
 
-use super::progress::{ProgressMode, Steps};
+use super::progress::Steps;
 use super::render::{pool, scene_name, watch_for_interrupt};
 use super::{Failure, Outcome};
 use crate::format::{self, Overrides};
@@ -111,11 +111,9 @@ pub fn run(args: &RadiosityArgs, command_line: &str) -> Result<Outcome, Failure>
         let text = report::statistics(&name, &spec, &solution, &seconds, threads);
         image_io::write_atomic(path, format!("{text:#}\n").as_bytes())?;
     }
-    if args.progress != ProgressMode::Never {
-        let pictures = snapshots.map_or(0, |s| s.written());
-        report::show(&report::table(&spec, &solution, &seconds));
-        report::written(&outputs, pictures, args.snapshots.as_deref());
-    }
+    let pictures = snapshots.map_or(0, |s| s.written());
+    report::show(&report::table(&spec, &solution, &seconds));
+    report::written(&outputs, pictures, args.snapshots.as_deref());
     Ok(match stopped.load(Ordering::Relaxed) {
         true => Outcome::Interrupted,
         false => Outcome::Done,

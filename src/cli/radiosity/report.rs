@@ -29,7 +29,7 @@ pub(super) fn table(spec: &SolveSpec, solution: &Solution, seconds: &Seconds) ->
         let said = said.lines().map(str::to_string);
         lines.extend(names.into_iter().zip(said));
     }
-    let reached = match r.converged {
+    let reached = match r.converged || r.residual <= spec.residual {
         true => String::new(),
         false => format!(", {:e} was asked for and not reached", spec.residual),
     };

@@ -5,7 +5,7 @@ use crate::geom::{Endpoint, Hit};
 use crate::math::{DVec2, DVec3};
 use crate::radiosity::mesh::on_facet;
 use crate::radiosity::polygon::point_to_polygon;
-use crate::radiosity::{Outline, Piece};
+use crate::radiosity::{Outline, Piece, Rgb64};
 use crate::sampler::mix;
 use crate::scene::Scene;
 use std::f64::consts::PI;
@@ -43,8 +43,14 @@ fn behind(a: &TreeNode, b: &TreeNode) -> bool {
     is_behind(a, &piece, &other) || is_behind(b, &other, &piece)
 }
 
-/// The pair of receiver `r` and sender `s`; `None` where neither can see the other. `fine` takes more rays.
-pub fn estimate(scene: &Scene, tree: &Tree, r: u32, s: u32, fine: bool) -> Option<Estimate> {
+/// The pair of receiver `r` and sender `s`; `None` where neither can see the other. Nodes have `radiosity`. `fine` takes more rays.
+pub fn estimate(
+    scene: &Scene,
+    tree: &Tree,
+    radiosity: &[Rgb64],
+    (r, s): (u32, u32),
+    fine: bool,
+) -> Option<Estimate> {
     let (receiver, sender) = (&tree.nodes[r as usize], &tree.nodes[s as usize]);
     match (receiver.kind, sender.kind) {
         (
@@ -71,15 +77,34 @@ pub fn estimate(scene: &Scene, tree: &Tree, r: u32, s: u32, fine: bool) -> Optio
                 numbers,
                 if fine { 4 } else { 1 },
             );
-            // All that the sender gets of what the receiver would send is 1: so much is known of a small sender.
-            let most = sender.area / receiver.area;
+            if sender.area >= receiver.area {
+                return Some(found);
+            }
+            // Four points of a wide receiver do not meet a small sender. All of the sender's points know much of the
+            // receiver, by A_r F_rs = A_s F_sr; where both disagree, light differs over the receiver.
+            let free = returned((sender, &sp), (receiver, &rp)) * sender.area / receiver.area;
+            let form_factor = found.visible * free;
             Some(Estimate {
-                form_factor: found.form_factor.min(most),
+                spread: found.spread.max((form_factor - found.form_factor).abs()),
+                form_factor,
                 ..found
             })
         }
-        _ => between_clusters(scene, tree, r, s),
+        _ => between_clusters(scene, tree, radiosity, (r, s)),
     }
+}
+
+/// Unoccluded form factor from the sender to the receiver: the mean over the middles of the sender's quarters.
+fn returned((sender, sp): (&TreeNode, &Piece), (receiver, rp): (&TreeNode, &Piece)) -> f64 {
+    let at = |quarter| {
+        let p = sp.child(quarter).center();
+        // What lies behind the receiver is not seen by it.
+        match (p - rp.o).dot(receiver.normal) > 0.0 {
+            true => point_to_polygon(p, sender.normal, rp.corners()),
+            false => 0.0,
+        }
+    };
+    0.25 * (0..4).map(at).sum::<f64>()
 }
 
 /// Unoccluded form factors at the middles of the receiver's quarters, and rays to the sender from each.
@@ -154,9 +179,7 @@ fn visibility(scene: &Scene, hit: &Hit, ends: &[Hit; 4], first: usize, rays: usi
         }
         let weight = (ca / d2) * (cb / d2);
         sent += weight;
-        if !blocked(scene, hit, &Endpoint::from(end)) {
-            arrived += weight;
-        }
+        arrived += weight * passed(scene, hit, &Endpoint::from(end));
         traced += 1;
         if traced == rays {
             break;
@@ -165,39 +188,84 @@ fn visibility(scene: &Scene, hit: &Hit, ends: &[Hit; 4], first: usize, rays: usi
     (sent > 0.0).then(|| arrived / sent)
 }
 
-fn blocked(scene: &Scene, from: &Hit, to: &Endpoint) -> bool {
+/// Share of light that arrives.
+fn passed(scene: &Scene, from: &Hit, to: &Endpoint) -> f64 {
     let ray = from.spawn_to(to);
-    ray.t_max <= 0.0 || scene.transmittance(&ray, PASSES) < 0.5
+    match ray.t_max > 0.0 {
+        true => f64::from(scene.transmittance(&ray, PASSES)),
+        false => 0.0,
+    }
 }
 
 /// Surfaces that a ray may pass through.
 const PASSES: u32 = 8;
 
-/// Random pairs of points, those that face each other with a ray between.
-fn between_clusters(scene: &Scene, tree: &Tree, r: u32, s: u32) -> Option<Estimate> {
-    let (receiver, sender) = (&tree.nodes[r as usize], &tree.nodes[s as usize]);
-    let mut numbers = Numbers::new(r, s);
-    let (mut free, mut arrived, mut most) = (0.0, 0.0, 0.0f64);
-    let (mut facing, mut tries) = (0, 0);
-    while tries < CLUSTER_TRIES && facing < CLUSTER_RAYS {
-        tries += 1;
-        let (a, b) = (tree.point(r, &mut numbers), tree.point(s, &mut numbers));
-        let kernel = kernel(&a, &b, sender.area);
+/// What random pairs of points of clusters found.
+#[derive(Default)]
+struct Met {
+    tries: usize,
+    /// Pairs that face each other.
+    facing: usize,
+    /// Their form factors, summed, and of those the share that arrives; the largest.
+    free: f64,
+    arrived: f64,
+    most: f64,
+}
+
+/// Random pairs of points, those that face each other with a ray between. Points of the receiver are uniform over its
+/// area, those of the sender over what `weigh` gives.
+fn meet(
+    scene: &Scene,
+    tree: &Tree,
+    (r, s): (u32, u32),
+    numbers: &mut Numbers,
+    weigh: impl Fn(usize) -> f64,
+) -> Met {
+    let mut met = Met::default();
+    while met.tries < CLUSTER_TRIES && met.facing < CLUSTER_RAYS {
+        met.tries += 1;
+        let a = tree.point(r, numbers, |n| tree.nodes[n].area);
+        let b = tree.point(s, numbers, &weigh);
+        let kernel = kernel(&a, &b, tree.nodes[s as usize].area);
         if kernel <= 0.0 {
             continue;
         }
-        facing += 1;
-        free += kernel;
-        most = most.max(kernel);
+        met.facing += 1;
+        met.free += kernel;
+        met.most = met.most.max(kernel);
         let hit = |at: &Point| on_facet(scene, &tree.surfaces, at.facet, &at.piece, at.st);
-        if !blocked(scene, &hit(&a), &Endpoint::from(&hit(&b))) {
-            arrived += kernel;
-        }
+        met.arrived += kernel * passed(scene, &hit(&a), &Endpoint::from(&hit(&b)));
     }
-    if free == 0.0 {
+    met
+}
+
+/// By random pairs of points.
+fn between_clusters(
+    scene: &Scene,
+    tree: &Tree,
+    radiosity: &[Rgb64],
+    (r, s): (u32, u32),
+) -> Option<Estimate> {
+    let (receiver, sender) = (&tree.nodes[r as usize], &tree.nodes[s as usize]);
+    let mut numbers = Numbers::new(r, s);
+    let area = |n: usize| tree.nodes[n].area;
+    let mut met = meet(scene, tree, (r, s), &mut numbers, area);
+    if met.facing == 0 {
+        // A lamp among much else that faces another way, or away, is met where light is looked for.
+        let power = |n: usize| area(n) * radiosity[n].element_sum().max(0.0);
+        met = meet(scene, tree, (r, s), &mut numbers, power);
+    }
+    if met.facing == 0 {
         // What so many pairs did not find is little.
         return None;
     }
+    let Met {
+        tries,
+        facing,
+        free,
+        arrived,
+        most,
+    } = met;
     let visible: f64 = arrived / free;
     let distance = receiver.center.distance(sender.center);
     let apart = distance - receiver.radius - sender.radius;
@@ -245,8 +313,8 @@ fn kernel(a: &Point, b: &Point, area: f64) -> f64 {
 }
 
 impl Tree {
-    /// A point below `node`, uniform over the area.
-    fn point(&self, mut node: u32, numbers: &mut Numbers) -> Point {
+    /// A point below `node`; surfaces are chosen by what `weigh` gives for them and for the clusters around them.
+    fn point(&self, mut node: u32, numbers: &mut Numbers, weigh: impl Fn(usize) -> f64) -> Point {
         loop {
             let n = &self.nodes[node as usize];
             match n.kind {
@@ -261,11 +329,16 @@ impl Tree {
                     };
                 }
                 Kind::Cluster { .. } => {
-                    let mut left = numbers.one() * n.area;
+                    let of = |child: u32| weigh(child as usize);
+                    let all: f64 = self.children(node).map(of).sum();
+                    let mut left = numbers.one() * all;
                     let mut chosen = NONE;
                     for child in self.children(node) {
-                        chosen = child;
-                        left -= self.nodes[child as usize].area;
+                        // Where all weigh nothing, any will do.
+                        if chosen == NONE || of(child) > 0.0 {
+                            chosen = child;
+                            left -= of(child);
+                        }
                         if left < 0.0 {
                             break;
                         }

@@ -21,6 +21,7 @@ mod sphere;
 mod trace;
 mod tree;
 mod walks;
+mod watch;
 
 use super::{Progress, Report, Rgb64, Solution, SolveError, SolveSpec, Surfaces};
 use crate::scene::Scene;
@@ -30,7 +31,8 @@ use refine::Refiner;
 use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
 use std::time::Instant;
-use tree::Tree;
+use tree::{NONE, Tree};
+use watch::Watch;
 
 /// A cluster or a piece of surface.
 #[derive(Clone, Debug, PartialEq)]
@@ -73,10 +75,14 @@ const LOOKS: u64 = 5;
 const MUCH: f64 = 0.05;
 /// Irradiance that is no more than this share of the mean is not resolved better than that.
 const BLACK: f64 = 1e-3;
+/// So many times the power of lights, and what links bring of it, walks can only find where they look at the wrong places
+/// (masks let light through, which arrives again, by links too).
+const IMPOSSIBLE: f64 = 2.0;
 /// Gathering steps after the last refinement, at most, when no other limit is given.
 const MAX_STEPS: u64 = 10_000;
 
-/// The hierarchical solution of `scene`.
+/// The hierarchical solution of `scene`. Where it is stopped while links are made, those that are still to be divided
+/// stay as they are, and nothing is put right by walks.
 pub fn solve(
     scene: &Scene,
     surfaces: Arc<Surfaces>,
@@ -90,18 +96,18 @@ pub fn solve(
         ..Report::default()
     };
     let mut refiner = Refiner::new(scene, &surfaces, spec, &mut tree);
-    let emitted = tree.emitted_power();
     let mut field = Field::new(&tree);
     let most = spec.max_steps.unwrap_or(MAX_STEPS);
     let mut too_much = 0.0;
     let mut parts = Parts::new(&tree);
+    let mut watch = Watch::new(observe);
     let looser = (LOOSEST / spec.error).log(STEP).floor() as i32;
     for looser in (0..=looser.clamp(0, LOOSER)).rev() {
         let clock = Instant::now();
         let error = spec.error * STEP.powi(looser);
         // What few links make dark may be brighter than it seems.
         let black = (BLACK * STEP.powi(looser)).min(0.25);
-        refiner.refine(&mut tree, &mut field, error, black);
+        refiner.refine(&mut tree, &mut field, error, black, &mut watch);
         if balance::keeps_all(scene, &tree, &field, spec.seed) {
             return Err(SolveError::NoAbsorption);
         }
@@ -111,44 +117,75 @@ pub fn solve(
         report.form_factor_seconds += clock.elapsed().as_secs_f64();
         let clock = Instant::now();
         // Before the last refinement, it is enough to see where light goes.
+        let stopped = watch.is_stopped();
         let (wanted, until) = match looser {
-            0 if spec.walks == 0 => (spec.residual, most),
+            0 if spec.walks == 0 && !stopped => (spec.residual, most),
             _ => (spec.residual.max(0.02), most.min(report.steps + LOOKS)),
         };
-        loop {
-            report.residual =
-                field.step(&tree, &parts) / emitted.element_sum().max(f64::MIN_POSITIVE);
-            report.steps += 1;
-            report.converged = looser == 0 && report.residual <= wanted;
-            let growing = !report.residual.is_finite();
-            if report.residual <= wanted || report.steps >= until || growing {
-                break;
-            }
-        }
+        iterate(
+            (&tree, &parts),
+            &mut field,
+            &mut report,
+            &mut watch,
+            wanted,
+            until,
+        );
+        report.converged = looser == 0 && !watch.is_stopped() && report.residual <= wanted;
         field.spread(&tree, &parts, None);
         report.solve_seconds += clock.elapsed().as_secs_f64();
-        if looser == 0 || report.steps >= most {
+        if looser == 0 || report.steps >= most || watch.is_stopped() {
             break;
         }
-        if observes(&tree, &field, &report, observe).is_break() {
+        watch.show(&tree, &field);
+        if watch.is_stopped() {
             break;
         }
     }
+    if watch.is_stopped() {
+        let said =
+            "stopped before all links were as good as was asked for: light is found only roughly";
+        report.warnings.push(said.to_string());
+    }
     report.links = tree.links();
     let mut direct = None;
-    if report.residual.is_finite() && spec.walks > 0 {
+    if report.residual.is_finite() && spec.walks > 0 && !watch.is_stopped() {
         let clock = Instant::now();
-        direct = Some(correct::correct(
+        let linked = arriving(&tree, &correct::straight(&tree, &parts));
+        let found = correct::correct(
             scene,
             &mut tree,
             &mut field,
             spec,
             &mut report,
-            observe,
-        ));
+            watch.observe,
+        );
+        let most_direct = linked.max(tree.emitted_power().element_sum());
+        let times = arriving(&tree, &found) / most_direct;
+        direct = Some(found);
+        if times > IMPOSSIBLE {
+            report.warnings.push(format!(
+                "straight from lights, walks bring {times:.1} times as much as there can be: patches are much larger than \
+                 what is lit of them; their links are trusted as they are: use a smaller min_size"
+            ));
+            too_much = balance::balance(&mut tree, &parts);
+            field = Field::new(&tree);
+            field.prepare(&tree, &parts);
+            let until = most.saturating_add(report.steps);
+            iterate(
+                (&tree, &parts),
+                &mut field,
+                &mut report,
+                &mut watch,
+                spec.residual,
+                until,
+            );
+            report.converged = !watch.is_stopped() && report.residual <= spec.residual;
+            field.spread(&tree, &parts, None);
+            direct = None;
+        }
         report.solve_seconds += clock.elapsed().as_secs_f64();
     }
-    if too_much > MUCH && spec.walks == 0 {
+    if too_much > MUCH && direct.is_none() {
         report.warnings.push(format!(
             "the form factors of patches were scaled down to a sum of 1, by {:.0} % in the mean: surfaces that coincide \
              or let light through, or links that are too coarse",
@@ -167,8 +204,41 @@ pub fn solve(
         ambient: Rgb64::ZERO,
         residual: solution.report.residual,
     };
-    let _ = observe(&last);
+    let _ = (watch.observe)(&last);
     Ok(solution)
+}
+
+/// Gathers by links until the residual is as wanted, or `until` steps are made in all, or it is stopped.
+fn iterate(
+    (tree, parts): (&Tree, &Parts),
+    field: &mut Field,
+    report: &mut Report,
+    watch: &mut Watch,
+    wanted: f64,
+    until: u64,
+) {
+    let emitted = tree.emitted_power().element_sum().max(f64::MIN_POSITIVE);
+    // Some light has to get around also in what is stopped.
+    let stopped = watch.is_stopped();
+    loop {
+        report.residual = field.step(tree, parts) / emitted;
+        report.steps += 1;
+        (watch.step, watch.residual) = (report.steps, report.residual);
+        let growing = !report.residual.is_finite();
+        if report.residual <= wanted || report.steps >= until || growing {
+            break;
+        }
+        if !stopped && watch.look(tree, field) {
+            break;
+        }
+    }
+}
+
+/// W that irradiance, by node, brings to patches.
+fn arriving(tree: &Tree, irradiance: &[Rgb64]) -> f64 {
+    let nodes = tree.nodes.iter().zip(irradiance);
+    let patches = nodes.filter(|(n, _)| !n.is_cluster() && n.quarters == NONE);
+    patches.map(|(n, e)| n.area * e.element_sum()).sum()
 }
 
 /// Shows the state between two refinements.

@@ -3,6 +3,7 @@
 use super::estimate::{Estimate, estimate};
 use super::gather::Field;
 use super::tree::{Kind, NONE, Tree, TreeLink};
+use super::watch::Watch;
 use crate::radiosity::lights::Others;
 use crate::radiosity::{Rgb64, SolveSpec, Surfaces};
 use crate::scene::Scene;
@@ -28,6 +29,18 @@ pub struct Refiner<'a> {
     links: usize,
 }
 
+/// Pairs that are judged between two looks whether to go on.
+const CHUNK: usize = 1 << 12;
+
+/// A receiver and a sender to be judged.
+struct Pair {
+    nodes: (u32, u32),
+    known: Known,
+}
+
+/// Form factor of a pair and the share of rays that arrive, as far as the pair that it is a part of tells.
+type Known = Option<[f32; 2]>;
+
 /// What becomes of a pair.
 enum Fate {
     /// Never any light.
@@ -38,6 +51,7 @@ enum Fate {
     /// To be replaced by pairs of the parts of one of them.
     Divided {
         sender: bool,
+        known: Known,
     },
 }
 
@@ -88,7 +102,13 @@ impl<'a> Refiner<'a> {
     }
 
     /// Divides surfaces over which the light of lights that are no patches differs too much.
-    fn refine_external(&self, tree: &mut Tree, field: &mut Field, threshold: f64) {
+    fn refine_external(
+        &self,
+        tree: &mut Tree,
+        field: &mut Field,
+        threshold: f64,
+        watch: &mut Watch,
+    ) {
         if self.others.is_empty() {
             return;
         }
@@ -102,6 +122,9 @@ impl<'a> Refiner<'a> {
             let large: Vec<u32> = nodes.iter().filter(large).copied().collect();
             let mut next = Vec::new();
             for node in large {
+                if watch.look(tree, field) {
+                    return;
+                }
                 let known = !tree.children(node).is_empty();
                 if !tree.divide(self.scene, node, self.min_size) {
                     continue;
@@ -127,24 +150,46 @@ impl<'a> Refiner<'a> {
     }
 
     /// Links all pairs of nodes so that no link errs by more than `threshold` (see [`errors`]), judged by the light
-    /// of `field`; what is darker than `black`, as a share of the mean, is no better than that.
-    pub fn refine(&mut self, tree: &mut Tree, field: &mut Field, threshold: f64, black: f64) {
+    /// of `field`; what is darker than `black`, as a share of the mean, is no better than that. Where `watch` ends it,
+    /// pairs are linked by what is known of the larger ones that they are parts of.
+    pub fn refine(
+        &mut self,
+        tree: &mut Tree,
+        field: &mut Field,
+        threshold: f64,
+        black: f64,
+        watch: &mut Watch,
+    ) {
         field.judge_by(tree, black);
-        self.refine_external(tree, field, threshold);
-        let mut pairs = std::mem::take(&mut self.dormant);
+        self.refine_external(tree, field, threshold, watch);
+        let unknown = |nodes| Pair { nodes, known: None };
+        let dormant = std::mem::take(&mut self.dormant);
+        let mut pairs: Vec<Pair> = dormant.into_iter().map(unknown).collect();
         pairs.extend(self.reconsidered(tree, field, threshold));
         while !pairs.is_empty() {
             self.links = tree.links() + pairs.len();
-            let judge = |&(r, s): &(u32, u32)| self.judge(tree, field, r, s, threshold);
-            let fates: Vec<Fate> = pairs.par_iter().map(judge).collect();
+            let judge = |pair: &Pair| self.judge(tree, field, pair.nodes, threshold);
+            let mut fates: Vec<Fate> = Vec::with_capacity(pairs.len());
+            for chunk in pairs.chunks(CHUNK) {
+                fates.par_extend(chunk.par_iter().map(judge));
+                if watch.look(tree, field) {
+                    break;
+                }
+            }
+            for pair in pairs.drain(fates.len()..) {
+                self.settle(tree, pair.nodes, pair.known);
+            }
             let mut next = Vec::new();
-            for ((r, s), fate) in pairs.into_iter().zip(fates) {
+            for (Pair { nodes, .. }, fate) in pairs.into_iter().zip(fates) {
                 match fate {
                     Fate::Dropped => {}
-                    Fate::Dormant => self.dormant.push((r, s)),
-                    Fate::Linked(link) => tree.nodes[r as usize].links.push(link),
-                    Fate::Divided { sender } => {
-                        self.divide(tree, field, (r, s), sender, &mut next);
+                    Fate::Dormant => self.dormant.push(nodes),
+                    Fate::Linked(link) => tree.nodes[nodes.0 as usize].links.push(link),
+                    Fate::Divided { known, .. } if watch.look(tree, field) => {
+                        self.settle(tree, nodes, known);
+                    }
+                    Fate::Divided { sender, known } => {
+                        self.divide(tree, field, (nodes, known), sender, &mut next);
                     }
                 }
             }
@@ -152,8 +197,21 @@ impl<'a> Refiner<'a> {
         }
     }
 
+    /// Links a pair that is not looked at any more; a pair of which nothing is known has to wait.
+    fn settle(&mut self, tree: &mut Tree, (r, s): (u32, u32), known: Known) {
+        match known {
+            Some([form_factor, visible]) => tree.nodes[r as usize].links.push(TreeLink {
+                sender: s,
+                form_factor,
+                spread: form_factor,
+                visible,
+            }),
+            None => self.dormant.push((r, s)),
+        }
+    }
+
     /// Takes out the links that are not good enough any more, as pairs to be divided.
-    fn reconsidered(&mut self, tree: &mut Tree, field: &Field, threshold: f64) -> Vec<(u32, u32)> {
+    fn reconsidered(&mut self, tree: &mut Tree, field: &Field, threshold: f64) -> Vec<Pair> {
         let mut pairs = Vec::new();
         for r in 0..tree.nodes.len() as u32 {
             let mut links = std::mem::take(&mut tree.nodes[r as usize].links);
@@ -168,7 +226,10 @@ impl<'a> Refiner<'a> {
                     .to_divide(tree, (r, link.sender), found, threshold)
                     .is_none();
                 if !good {
-                    pairs.push((r, link.sender));
+                    pairs.push(Pair {
+                        nodes: (r, link.sender),
+                        known: Some([link.form_factor, link.visible]),
+                    });
                 }
                 good
             });
@@ -177,7 +238,7 @@ impl<'a> Refiner<'a> {
         pairs
     }
 
-    fn judge(&self, tree: &Tree, field: &Field, r: u32, s: u32, threshold: f64) -> Fate {
+    fn judge(&self, tree: &Tree, field: &Field, (r, s): (u32, u32), threshold: f64) -> Fate {
         let sent = field.radiosity[s as usize].max_element();
         let receiver = &tree.nodes[r as usize];
         if r == s && !receiver.is_cluster() {
@@ -189,15 +250,21 @@ impl<'a> Refiner<'a> {
         // No form factor is larger than 1.
         let most = weight(tree, field, r) * sent;
         if r == s && most > threshold {
-            return Fate::Divided { sender: false };
+            return Fate::Divided {
+                sender: false,
+                known: None,
+            };
         }
         let fine = most > threshold;
-        let Some(found) = estimate(self.scene, tree, r, s, fine) else {
+        let Some(found) = estimate(self.scene, tree, &field.radiosity, (r, s), fine) else {
             return Fate::Dropped;
         };
         let errors = errors(tree, field, r, s, &found);
         if let Some(sender) = self.to_divide(tree, (r, s), errors, threshold) {
-            return Fate::Divided { sender };
+            return Fate::Divided {
+                sender,
+                known: Some([found.form_factor as f32, found.visible as f32]),
+            };
         }
         Fate::Linked(TreeLink {
             sender: s,
@@ -255,20 +322,24 @@ impl<'a> Refiner<'a> {
         &mut self,
         tree: &mut Tree,
         field: &mut Field,
-        (r, s): (u32, u32),
+        ((r, s), known): ((u32, u32), Known),
         sender: bool,
-        next: &mut Vec<(u32, u32)>,
+        next: &mut Vec<Pair>,
     ) {
         if r == s {
             for a in tree.children(r) {
-                next.extend(tree.children(r).map(|b| (a, b)));
+                let pair = |b| Pair {
+                    nodes: (a, b),
+                    known: None,
+                };
+                next.extend(tree.children(r).map(pair));
             }
             return;
         }
         let node = if sender { s } else { r };
         if !tree.divide(self.scene, node, self.min_size) {
             // Patches ran out while the pairs were looked at.
-            if let Some(found) = estimate(self.scene, tree, r, s, true) {
+            if let Some(found) = estimate(self.scene, tree, &field.radiosity, (r, s), true) {
                 tree.nodes[r as usize].links.push(TreeLink {
                     sender: s,
                     form_factor: found.form_factor as f32,
@@ -284,7 +355,18 @@ impl<'a> Refiner<'a> {
             self.light(tree, &quarters);
         }
         for child in tree.children(node) {
-            next.push(if sender { (r, child) } else { (child, s) });
+            let share = tree.nodes[child as usize].area / tree.nodes[node as usize].area;
+            next.push(match sender {
+                true => Pair {
+                    nodes: (r, child),
+                    // What a part of a sender gives is its part of the form factor.
+                    known: known.map(|[f, visible]| [f * share as f32, visible]),
+                },
+                false => Pair {
+                    nodes: (child, s),
+                    known,
+                },
+            });
         }
     }
 }

@@ -4,7 +4,7 @@
 use super::System;
 use crate::geom::Hit;
 use crate::math::{DVec2, Frame, Vec2, Vec3, warp};
-use crate::radiosity::{Rgb64, SolveError};
+use crate::radiosity::{Rgb64, SolveError, optics};
 use crate::sampler::{Sampler, SamplerKind};
 use crate::scene::Scene;
 use rayon::prelude::*;
@@ -17,6 +17,9 @@ const ALL: f64 = 1.0 - 1e-6;
 
 /// An error of brightness that is worth a warning.
 const DOUBT: f64 = 0.05;
+
+/// Masks in a row that a ray passes, at most.
+const PASSES: u32 = 8;
 
 /// Refuses scenes that are closed by patches which absorb nothing, in a channel that has light.
 pub(super) fn check(scene: &Scene, system: &System, seed: u64) -> Result<(), SolveError> {
@@ -81,9 +84,20 @@ fn lost(scene: &Scene, system: &System, weights: &[f64], seed: u64) -> f64 {
         let outline = system.mesh.patches[patch].piece.outline;
         let st = outline.sample(DVec2::new(f64::from(x), f64::from(y)));
         let hit = system.mesh.hit(scene, patch as u32, st);
-        let ray = hit.spawn(direction(&hit, Vec2::new(u, v)));
-        let met = scene.intersect(&ray);
-        met.is_none_or(|met| system.mesh.locate(&met).is_none())
+        let towards = direction(&hit, Vec2::new(u, v));
+        let mut ray = hit.spawn(towards);
+        for pass in 0..PASSES {
+            let Some(met) = scene.intersect(&ray) else {
+                return true;
+            };
+            // Masks let it pass by chance.
+            let [chance, ..] = sampler.get4(2 + pass);
+            if optics::at(scene, &met, chance).through == Rgb64::ZERO {
+                return system.mesh.locate(&met).is_none();
+            }
+            ray = met.spawn(towards);
+        }
+        true
     };
     (0..RAYS).into_par_iter().filter(|&i| is_lost(i)).count() as f64 / RAYS as f64
 }

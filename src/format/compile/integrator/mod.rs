@@ -13,6 +13,7 @@ use crate::format::plugins::Category;
 use crate::format::{Overrides, Props, SceneError};
 use crate::render::AovLayer;
 use crate::transport::aov::Aov;
+use crate::transport::radiosity::Indirect;
 use crate::transport::{
     CacheSpec, CombinedSpec, DirectSpec, IntegratorSpec, PathSpec, PhotonMapperSpec, RadiositySpec,
 };
@@ -34,8 +35,9 @@ pub fn integrator(
     overrides: &Overrides,
 ) -> Result<(IntegratorSpec, Vec<AovLayer>), SceneError> {
     let mut found = Vec::new();
+    let indirect = radiosity::wanted(overrides)?;
     let spec = match root.child(Category::Integrator) {
-        Some(props) => unwrap(&props, &mut found)?,
+        Some(props) => unwrap(&props, indirect, &mut found)?,
         None => None,
     };
     let spec = spec.unwrap_or(IntegratorSpec::Path(PathSpec::default()));
@@ -43,7 +45,7 @@ pub fn integrator(
         Some(name) => replaced(spec, name)?,
         None => spec,
     };
-    spec = radiosity::overridden(spec, overrides)?;
+    spec = radiosity::overridden(spec, indirect)?;
     if let Some(depth) = overrides.max_depth {
         let name = spec.name();
         let Some(limit) = spec.max_depth() else {
@@ -61,8 +63,12 @@ fn depth_limit(depth: i64) -> Option<u32> {
     u32::try_from(depth).ok()
 }
 
-/// The integrator inside any wrappers; `None` where wrappers hold none.
-fn unwrap(props: &Props, found: &mut Vec<AovLayer>) -> Result<Option<IntegratorSpec>, SceneError> {
+/// The integrator inside any wrappers; `None` where wrappers hold none. `indirect` is what the command line wants.
+fn unwrap(
+    props: &Props,
+    indirect: Option<Indirect>,
+    found: &mut Vec<AovLayer>,
+) -> Result<Option<IntegratorSpec>, SceneError> {
     // How the work is divided changes nothing in the picture.
     props.ignore(&["samples_per_pass", "block_size"]);
     if props.float("timeout")? > 0.0 {
@@ -73,12 +79,13 @@ fn unwrap(props: &Props, found: &mut Vec<AovLayer>) -> Result<Option<IntegratorS
     match props.plugin() {
         "path" => {
             let spec = IntegratorSpec::Path(path(props, hide_emitters)?);
-            Ok(Some(spec.with_cache(radiosity::cache(props)?)))
+            Ok(Some(spec.with_cache(radiosity::cache(props, indirect)?)))
         }
         "radiosity" => radiosity::shown(props, path(props, hide_emitters)?).map(Some),
         "combined" => Ok(Some(IntegratorSpec::Combined(photons::combined(
             props,
             path(props, hide_emitters)?,
+            indirect,
         )?))),
         "photonmapper" => {
             let spec = photons::photon_mapper(props, path(props, hide_emitters)?)?;
@@ -102,7 +109,7 @@ fn unwrap(props: &Props, found: &mut Vec<AovLayer>) -> Result<Option<IntegratorS
                         format!("several integrators inside \"{wrapper}\" are not supported");
                     return Err(child.error(what).with_help("keep one of them"));
                 }
-                inner = unwrap(child, found)?;
+                inner = unwrap(child, indirect, found)?;
             }
             if let Some(inner) = &mut inner {
                 *inner.hide_emitters() |= hide_emitters;

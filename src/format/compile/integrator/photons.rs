@@ -4,6 +4,7 @@ use super::bidir::innermost;
 use crate::format::compile::on_command_line;
 use crate::format::{Overrides, Props, SceneError};
 use crate::render::Job;
+use crate::transport::radiosity::Indirect;
 use crate::transport::{CombinedSpec, PathSpec, PhotonMapperSpec, PhotonSpec, Show};
 
 /// Bytes of what memory is asked for in.
@@ -26,7 +27,11 @@ pub fn spec(props: &Props) -> Result<PhotonSpec, SceneError> {
     })
 }
 
-pub fn combined(props: &Props, path: PathSpec) -> Result<CombinedSpec, SceneError> {
+pub fn combined(
+    props: &Props,
+    path: PathSpec,
+    indirect: Option<Indirect>,
+) -> Result<CombinedSpec, SceneError> {
     Ok(CombinedSpec {
         path,
         photons: spec(props)?,
@@ -34,7 +39,7 @@ pub fn combined(props: &Props, path: PathSpec) -> Result<CombinedSpec, SceneErro
             true => Show::All,
             false => Show::AllByPath,
         },
-        cache: super::radiosity::cache(props)?,
+        cache: super::radiosity::cache(props, indirect)?,
     })
 }
 

@@ -108,13 +108,15 @@ pub fn shown(props: &Props, path: PathSpec) -> Result<IntegratorSpec, SceneError
     }))
 }
 
-/// The use that a path tracer makes of radiosity.
-pub fn cache(props: &Props) -> Result<CacheSpec, SceneError> {
+/// The use that a path tracer makes of radiosity: what the command line wants, if it says so, else what the scene does.
+pub fn cache(props: &Props, wanted: Option<Indirect>) -> Result<CacheSpec, SceneError> {
     let name = props.string("indirect")?;
-    let indirect = Indirect::ALL.into_iter().find(|i| i.name() == name);
-    let indirect = indirect.unwrap_or_default();
+    let named = Indirect::ALL.into_iter().find(|i| i.name() == name);
+    let indirect = wanted.or(named).unwrap_or_default();
     if indirect == Indirect::None {
-        if let Some(name) = SOLVING.into_iter().find(|name| props.is_given(name)) {
+        let unused = SOLVING.into_iter().find(|name| props.is_given(name));
+        // What the command line switches off may keep its settings.
+        if let (Some(name), None) = (unused, wanted) {
             let what = format!("\"{name}\" has no effect without radiosity");
             let help = "leave it out, or set \"indirect\" to \"gather\" or \"guide\"";
             return Err(props.error_at(name, what).with_help(help));
@@ -124,7 +126,7 @@ pub fn cache(props: &Props) -> Result<CacheSpec, SceneError> {
     }
     let mut solve = solve(props, CacheSpec::default().solve)?;
     if indirect == Indirect::Guide {
-        if solve.solver != Solver::Hierarchical {
+        if solve.solver != Solver::Hierarchical && wanted.is_none() {
             return Err(props
                 .error_at("solver", no_links(solve.solver))
                 .with_help(INSTEAD));
@@ -141,21 +143,28 @@ pub fn cache(props: &Props) -> Result<CacheSpec, SceneError> {
     })
 }
 
+/// What the command line wants of light between diffuse surfaces.
+pub fn wanted(overrides: &Overrides) -> Result<Option<Indirect>, SceneError> {
+    let Some(name) = &overrides.indirect else {
+        return Ok(None);
+    };
+    let found = Indirect::ALL.into_iter().find(|i| i.name() == name);
+    found.map(Some).ok_or_else(|| {
+        let what = format!("unknown way \"{name}\" to find indirect light");
+        let help = suggest(name, Indirect::ALL.map(Indirect::name));
+        on_command_line("--indirect", name, what).with_help(help)
+    })
+}
+
 /// `spec` with what the command line wants of light between diffuse surfaces.
 pub fn overridden(
     spec: IntegratorSpec,
-    overrides: &Overrides,
+    wanted: Option<Indirect>,
 ) -> Result<IntegratorSpec, SceneError> {
-    let Some(name) = &overrides.indirect else {
+    let Some(indirect) = wanted else {
         return Ok(spec);
     };
-    let error = |what: String| on_command_line("--indirect", name, what);
-    let Some(indirect) = Indirect::ALL.into_iter().find(|i| i.name() == name) else {
-        let help = suggest(name, Indirect::ALL.map(Indirect::name));
-        return Err(
-            error(format!("unknown way \"{name}\" to find indirect light")).with_help(help),
-        );
-    };
+    let error = |what: String| on_command_line("--indirect", indirect.name(), what);
     match spec.cache() {
         Some(cache)
             if indirect == Indirect::Guide && cache.solve.solver != Solver::Hierarchical =>

@@ -1,0 +1,60 @@
+//! A wish to stop is heard wherever work takes long.
+
+use crate::rooms::*;
+use luxel::radiosity::{self, Progress, Solution, SolveSpec};
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+/// Links are divided down to this size, however little they err.
+fn endless(min_size: f64) -> SolveSpec {
+    SolveSpec {
+        error: 1e-12,
+        min_size: Some(min_size),
+        ..SolveSpec::default()
+    }
+}
+
+/// What an observer sees until it stops, and how long that takes to be heard.
+fn stopped(spec: &SolveSpec, mut at: impl FnMut(&Progress) -> bool) -> (Solution, Duration) {
+    let scene = scene(&room_of_blocks(1.0, 0.3));
+    let mut since = None;
+    let mut observe = |p: &Progress| {
+        assert_eq!(p.radiosity.len(), p.mesh.len());
+        if at(p) {
+            since.get_or_insert_with(Instant::now);
+            return ControlFlow::Break(());
+        }
+        ControlFlow::Continue(())
+    };
+    let solution = radiosity::solve(&scene, spec, &mut observe).unwrap();
+    let heard = since.expect("shown to the observer").elapsed();
+    (solution, heard)
+}
+
+#[test]
+fn links_that_would_take_minutes_end_when_that_is_wished() {
+    // Before there is any solution: millions of links of the lamp; and after the first: millions of others.
+    for (step, min_size) in [(0, 1e-3), (1, 0.1)] {
+        // The second time, so that the step is over and links are being made.
+        let mut seen = 0;
+        let (solution, heard) = stopped(&endless(min_size), |p| {
+            seen += u32::from(p.step >= step);
+            seen >= 2
+        });
+        // Some gathering over the links that there are; seconds are for machines with other work.
+        assert!(heard < Duration::from_secs(5), "{heard:?}");
+        let r = &solution.report;
+        assert!(!r.converged);
+        let said = r
+            .warnings
+            .iter()
+            .filter(|w| w.starts_with("stopped before"));
+        assert_eq!(said.count(), 1, "{:?}", r.warnings);
+        let all = solution.radiosity.iter().chain(&solution.irradiance);
+        assert!(all.into_iter().all(|x| x.is_finite()));
+        // Light straight from the lamp at least, from which walls of any reflectance take in some, and no more than
+        // there is but for the error of rough links.
+        let share = r.absorbed.element_sum() / r.emitted.element_sum();
+        assert!((0.1..1.1).contains(&share), "step {step}: {share}");
+    }
+}
