@@ -8,7 +8,6 @@ mod external;
 mod extremes;
 mod masks;
 mod rooms;
-mod sizes;
 mod solvers;
 mod stopping;
 mod surfaces;

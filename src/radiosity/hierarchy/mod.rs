@@ -31,7 +31,7 @@ use refine::Refiner;
 use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
 use std::time::Instant;
-use tree::{NONE, Tree};
+use tree::Tree;
 use watch::Watch;
 
 /// A cluster or a piece of surface.
@@ -75,9 +75,6 @@ const LOOKS: u64 = 5;
 const MUCH: f64 = 0.05;
 /// Irradiance that is no more than this share of the mean is not resolved better than that.
 const BLACK: f64 = 1e-3;
-/// So many times the power of lights, and what links bring of it, walks can only find where they look at the wrong places
-/// (masks let light through, which arrives again, by links too).
-const IMPOSSIBLE: f64 = 2.0;
 /// Gathering steps after the last refinement, at most, when no other limit is given.
 const MAX_STEPS: u64 = 10_000;
 
@@ -96,6 +93,7 @@ pub fn solve(
         ..Report::default()
     };
     let mut refiner = Refiner::new(scene, &surfaces, spec, &mut tree);
+    let emitted = tree.emitted_power();
     let mut field = Field::new(&tree);
     let most = spec.max_steps.unwrap_or(MAX_STEPS);
     let mut too_much = 0.0;
@@ -122,15 +120,21 @@ pub fn solve(
             0 if spec.walks == 0 && !stopped => (spec.residual, most),
             _ => (spec.residual.max(0.02), most.min(report.steps + LOOKS)),
         };
-        iterate(
-            (&tree, &parts),
-            &mut field,
-            &mut report,
-            &mut watch,
-            wanted,
-            until,
-        );
-        report.converged = looser == 0 && !watch.is_stopped() && report.residual <= wanted;
+        loop {
+            report.residual =
+                field.step(&tree, &parts) / emitted.element_sum().max(f64::MIN_POSITIVE);
+            report.steps += 1;
+            report.converged = looser == 0 && !stopped && report.residual <= wanted;
+            let growing = !report.residual.is_finite();
+            if report.residual <= wanted || report.steps >= until || growing {
+                break;
+            }
+            (watch.step, watch.residual) = (report.steps, report.residual);
+            if !stopped && watch.look(&tree, &field) {
+                break;
+            }
+        }
+        (watch.step, watch.residual) = (report.steps, report.residual);
         field.spread(&tree, &parts, None);
         report.solve_seconds += clock.elapsed().as_secs_f64();
         if looser == 0 || report.steps >= most || watch.is_stopped() {
@@ -150,42 +154,17 @@ pub fn solve(
     let mut direct = None;
     if report.residual.is_finite() && spec.walks > 0 && !watch.is_stopped() {
         let clock = Instant::now();
-        let linked = arriving(&tree, &correct::straight(&tree, &parts));
-        let found = correct::correct(
+        direct = Some(correct::correct(
             scene,
             &mut tree,
             &mut field,
             spec,
             &mut report,
             watch.observe,
-        );
-        let most_direct = linked.max(tree.emitted_power().element_sum());
-        let times = arriving(&tree, &found) / most_direct;
-        direct = Some(found);
-        if times > IMPOSSIBLE {
-            report.warnings.push(format!(
-                "straight from lights, walks bring {times:.1} times as much as there can be: patches are much larger than \
-                 what is lit of them; their links are trusted as they are: use a smaller min_size"
-            ));
-            too_much = balance::balance(&mut tree, &parts);
-            field = Field::new(&tree);
-            field.prepare(&tree, &parts);
-            let until = most.saturating_add(report.steps);
-            iterate(
-                (&tree, &parts),
-                &mut field,
-                &mut report,
-                &mut watch,
-                spec.residual,
-                until,
-            );
-            report.converged = !watch.is_stopped() && report.residual <= spec.residual;
-            field.spread(&tree, &parts, None);
-            direct = None;
-        }
+        ));
         report.solve_seconds += clock.elapsed().as_secs_f64();
     }
-    if too_much > MUCH && direct.is_none() {
+    if too_much > MUCH && spec.walks == 0 {
         report.warnings.push(format!(
             "the form factors of patches were scaled down to a sum of 1, by {:.0} % in the mean: surfaces that coincide \
              or let light through, or links that are too coarse",
@@ -206,39 +185,6 @@ pub fn solve(
     };
     let _ = (watch.observe)(&last);
     Ok(solution)
-}
-
-/// Gathers by links until the residual is as wanted, or `until` steps are made in all, or it is stopped.
-fn iterate(
-    (tree, parts): (&Tree, &Parts),
-    field: &mut Field,
-    report: &mut Report,
-    watch: &mut Watch,
-    wanted: f64,
-    until: u64,
-) {
-    let emitted = tree.emitted_power().element_sum().max(f64::MIN_POSITIVE);
-    // Some light has to get around also in what is stopped.
-    let stopped = watch.is_stopped();
-    loop {
-        report.residual = field.step(tree, parts) / emitted;
-        report.steps += 1;
-        (watch.step, watch.residual) = (report.steps, report.residual);
-        let growing = !report.residual.is_finite();
-        if report.residual <= wanted || report.steps >= until || growing {
-            break;
-        }
-        if !stopped && watch.look(tree, field) {
-            break;
-        }
-    }
-}
-
-/// W that irradiance, by node, brings to patches.
-fn arriving(tree: &Tree, irradiance: &[Rgb64]) -> f64 {
-    let nodes = tree.nodes.iter().zip(irradiance);
-    let patches = nodes.filter(|(n, _)| !n.is_cluster() && n.quarters == NONE);
-    patches.map(|(n, e)| n.area * e.element_sum()).sum()
 }
 
 /// Shows the state between two refinements.
