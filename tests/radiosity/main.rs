@@ -8,6 +8,7 @@ mod external;
 mod extremes;
 mod masks;
 mod rooms;
+mod sizes;
 mod solvers;
 mod stopping;
 mod surfaces;

@@ -96,7 +96,7 @@ pub fn correct(
 /// Traces walks, and divides patches as finely as these tell them apart.
 fn walks(scene: &Scene, tree: &mut Tree, field: &mut Field, spec: &SolveSpec) -> Walks {
     let (mesh, traced) = output::mesh(tree);
-    let lit = |&node: &u32| field.radiosity[node as usize].element_sum() > 0.0;
+    let lit = |&node: &u32| field.irradiance[node as usize].element_sum() > 0.0;
     let lit: Vec<bool> = traced.leaf.iter().map(lit).collect();
     let traces = Traces::new(scene, tree, &mesh, &lit, spec);
     let reflected = |patch: u32| {

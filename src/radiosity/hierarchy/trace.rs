@@ -14,9 +14,8 @@ use crate::sampler::{Sampler, SamplerKind};
 use crate::scene::Scene;
 use rayon::prelude::*;
 
-/// Edges of a walk between diffuse surfaces, at most, the first of which does not count. Few: where a scene is open,
-/// those of long walks lie where surfaces see much of each other.
-const LONGEST: u32 = 5;
+/// Edges of a walk between diffuse surfaces, at most, the first of which does not count.
+const LONGEST: u32 = 8;
 /// Mirrors, glass and gloss in a row, at most.
 const PASSES: u32 = 8;
 
@@ -57,9 +56,11 @@ impl Traces {
     /// About as many edges as asked for; fewer where they leave the scene soon.
     ///
     /// Walks start anywhere on patches that are `lit` (by patch), uniformly by area, and go on with equal chances,
-    /// however dark a surface is. So, in a closed scene, each point is visited as often as any other, and the mean over
-    /// the visits of a patch is the mean over its area; walks that followed light would be where it is bright. The
-    /// first point does not count: it may lie within a wall or another body, where nothing is met from.
+    /// however dark a surface is; one that leaves the scene goes on from where it was. So each point is visited as
+    /// often as any other: a step takes light's way from all that a point sees, so as many come from there as leave to
+    /// there, and as many stay as leave to the sky. The mean over the visits of a patch is then the mean over its area;
+    /// walks that followed light would be where it is bright. The first point does not count: it may lie within a
+    /// wall or another body, where nothing that is lit is met from.
     pub fn new(
         scene: &Scene,
         tree: &Tree,
@@ -83,6 +84,7 @@ impl Traces {
             let walker = Walker {
                 scene,
                 mesh,
+                lit,
                 gloss: spec.gloss,
                 sampler,
                 blocks: 0,
@@ -151,6 +153,7 @@ impl Point {
 struct Walker<'a> {
     scene: &'a Scene,
     mesh: &'a PatchMesh,
+    lit: &'a [bool],
     gloss: Gloss,
     sampler: Sampler,
     /// Numbers that are used up.
@@ -195,8 +198,12 @@ impl Walker<'_> {
                 }
             };
             match next {
-                Some(next) => (from, hit) = next,
-                None => break,
+                Next::Surface(next, there) if self.lit[next.patch as usize] => {
+                    (from, hit) = (next, there);
+                }
+                // What no light comes to is within something.
+                Next::Surface(..) | Next::Nothing => break,
+                Next::Sky => last = None,
             }
         }
         self.found
@@ -204,9 +211,9 @@ impl Walker<'_> {
 
     /// Looks along `wi` from `hit`, the next visit, by what mirrors and glass show: gives the emitters that are seen,
     /// and the first diffuse surface.
-    fn follow(&mut self, mut hit: Hit, mut wi: Vec3) -> (Shown, Option<(Located, Hit)>) {
+    fn follow(&mut self, mut hit: Hit, mut wi: Vec3) -> (Shown, Next) {
         let (origin, density) = (hit, Density::PerSr(front(&hit).dot(wi) / PI));
-        let (mut next, mut shown) = (None, Shown::default());
+        let (mut next, mut shown) = (Next::Nothing, Shown::default());
         let (mut throughput, mut bent) = (Rgb::WHITE, false);
         for _ in 0..PASSES {
             let met = self.scene.intersect(&hit.spawn(wi));
@@ -229,6 +236,9 @@ impl Walker<'_> {
                 }
             }
             let Some(met) = met else {
+                if let Next::Nothing = next {
+                    next = Next::Sky;
+                }
                 break;
             };
             hit = met;
@@ -246,7 +256,9 @@ impl Walker<'_> {
                     weight: (throughput * diffuse).to_array(),
                     lit: None,
                 });
-                next = next.or(Some((at, hit)));
+                if let Next::Nothing = next {
+                    next = Next::Surface(at, hit);
+                }
             }
             let Some(rest) = shading.without_diffuse() else {
                 break;
@@ -267,6 +279,15 @@ impl Walker<'_> {
         }
         (shown, next)
     }
+}
+
+/// Where an edge leads.
+enum Next {
+    Surface(Located, Hit),
+    /// Out of the scene.
+    Sky,
+    /// To what has no patch.
+    Nothing,
 }
 
 /// Irradiance in W/m² by the emitters that an edge sees: straight, where these cannot be sampled as well, and by
