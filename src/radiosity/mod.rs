@@ -102,8 +102,8 @@ pub struct SolveSpec {
     /// All links together err by no more than `links` (see [`Report`]) times this, as a share of the irradiance in
     /// the mean over all surfaces; by far less where their signs differ, and where walks put them right. Against the
     /// direct solution of five rooms (tests/radiosity_accuracy; root mean square of irradiance on squares of an eighth
-    /// of a wall, as a share of the mean irradiance): 1 to 10 % at 1e-3, 0.5 to 1 % at 1e-4 and at 1e-5; without walks
-    /// 6 to 23 %, 3 to 8 %, 0.4 to 6 %. Where `min_size` stops the division, smaller errors bring nothing more.
+    /// of a wall, as a share of the mean irradiance): 1 to 6 % at 1e-3, 0.5 to 2 % at 1e-4, 0.2 to 1 % at 1e-5; without
+    /// walks 6 to 16 %, 3 to 8 %, 0.4 to 6 %. Where `min_size` stops the division, smaller errors bring nothing more.
     pub error: f64,
     /// The iteration ends when the residual, relative to the emitted power, is less.
     pub residual: f64,
