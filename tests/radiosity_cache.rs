@@ -469,7 +469,8 @@ fn settings_of_the_scene_meet_the_way_of_the_command_line() {
     let error = r#"<float name="error" value="0.003"/>"#;
     for kind in ["path", "combined"] {
         for before in ["", gather] {
-            for (indirect, usual) in [(Indirect::Gather, 1e-2), (Indirect::Guide, 1e-4)] {
+            for indirect in [Indirect::Gather, Indirect::Guide] {
+                let usual = CacheSpec::of(indirect).solve.error;
                 let with = |params: String| solved(kind, &params, indirect.name()).unwrap();
                 let found = with(format!("{before}{walks}"));
                 assert_eq!((found.walks, found.error), (65_536, usual), "{kind}");
