@@ -7,7 +7,7 @@ use super::tree::{Gain, Kind, NONE, Tree};
 use super::walks::{Order, Walks};
 use super::{output, refine};
 use crate::math::DVec2;
-use crate::radiosity::{Progress, Report, Rgb64, SolveSpec};
+use crate::radiosity::{Gloss, Progress, Report, Rgb64, SolveSpec};
 use crate::scene::Scene;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
@@ -41,10 +41,11 @@ pub fn correct(
     let direct = corrected(tree, parts, &walks);
     let of_patch = |&leaf: &u32| direct[leaf as usize];
     walks.set_straight(walks.leaf.iter().map(of_patch).collect());
+    let given = stray(tree, &walks, &direct);
     let met = walks.met();
     let order = Order::new(tree, Some(parts));
     let irradiance = std::mem::take(&mut field.irradiance);
-    let mut reflected = Field::reflected(tree, direct.clone(), irradiance);
+    let mut reflected = Field::reflected(tree, given.clone(), irradiance);
     reflected.prepare(tree, parts);
     let (mut spread, mut settled, mut grows) = (None, false, false);
     for step in 1..=spec.max_steps.unwrap_or(super::MAX_STEPS) {
@@ -85,7 +86,7 @@ pub fn correct(
     let arriving = walks.arriving(&irradiance);
     let (in_bodies, _) = walks.gains(tree, &Order::new(tree, None), &arriving, &by_links, spread);
     if let Some(edges) = spec.max_edges.filter(|&e| u64::from(e) < report.steps) {
-        reflected = edge_by_edge(tree, parts, &direct, edges);
+        reflected = edge_by_edge(tree, parts, &given, edges);
     }
     reflected.spread(tree, parts, Some(&in_bodies));
     reflected.emit(tree);
@@ -96,7 +97,10 @@ pub fn correct(
 /// Traces walks, and divides patches as finely as these tell them apart.
 fn walks(scene: &Scene, tree: &mut Tree, field: &mut Field, spec: &SolveSpec) -> Walks {
     let (mesh, traced) = output::mesh(tree);
-    let lit = |&node: &u32| field.irradiance[node as usize].element_sum() > 0.0;
+    // Links know nothing of light by mirrors, glass and gloss.
+    let all =
+        spec.gloss != Gloss::LeftOut && (scene.throws_caustics().is_ok() || scene.is_glossy());
+    let lit = |&node: &u32| all || field.irradiance[node as usize].element_sum() > 0.0;
     let lit: Vec<bool> = traced.leaf.iter().map(lit).collect();
     let traces = Traces::new(scene, tree, &mesh, &lit, spec);
     let reflected = |patch: u32| {
@@ -212,6 +216,24 @@ fn corrected(tree: &Tree, parts: &Parts, walks: &Walks) -> Vec<Rgb64> {
         direct[leaf as usize] = gain.of(direct[leaf as usize]);
     }
     direct
+}
+
+/// `direct` (by node) and what comes from emitters by mirrors, glass and gloss, as far as walks tell: links, and what
+/// corrects them, know nothing of that.
+fn stray(tree: &Tree, walks: &Walks, direct: &[Rgb64]) -> Vec<Rgb64> {
+    let mut given = direct.to_vec();
+    if walks.stray.squares.iter().all(|s| *s == 0.0) {
+        return given;
+    }
+    let order = Order::new(tree, None);
+    // Where little is known, as much as around.
+    let same = vec![Rgb64::ONE; walks.leaf.len()];
+    let (gains, _) = walks.gains(tree, &order, &walks.stray, &same, None);
+    for &leaf in &walks.leaf {
+        let gain = gains[order.number[leaf as usize] as usize];
+        given[leaf as usize] += gain.of(Rgb64::ONE);
+    }
+    given
 }
 
 /// What links bring to patches that walks met, and their irradiance: by patch.

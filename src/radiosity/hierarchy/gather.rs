@@ -150,7 +150,10 @@ impl Field {
     /// Takes the light that there is as what errors are judged against.
     /// What is darker than `black`, as a share of the mean, counts as that dark.
     pub fn judge_by(&mut self, tree: &Tree, black: f64) {
-        let mean = self.irradiance[0].max_element();
+        /// Share of the light that counts as arriving even if links bring less: all may come through glass.
+        const LEAST: f64 = 0.01;
+        let given = tree.emitted_power().max_element() / tree.nodes[0].area;
+        let mean = self.irradiance[0].max_element().max(LEAST * given);
         if mean.is_nan() || mean <= 0.0 {
             self.usual = vec![self.radiosity[0].max_element(); tree.nodes.len()];
             return;

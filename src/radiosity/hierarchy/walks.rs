@@ -23,7 +23,7 @@ pub struct Walks {
     /// By patch: irradiance straight from emitters, summed over its points, in W/m².
     pub direct: Arrived,
     /// The same from emitters by mirrors, glass and gloss.
-    stray: Vec<Rgb64>,
+    pub stray: Arrived,
     /// What edges found; those from patch i are `first[i]..first[i + 1]`.
     terms: Vec<Term>,
     first: Vec<u32>,
@@ -67,7 +67,10 @@ impl Walks {
                 sum: vec![Rgb64::ZERO; leaf.len()],
                 squares: vec![0.0; leaf.len()],
             },
-            stray: vec![Rgb64::ZERO; leaf.len()],
+            stray: Arrived {
+                sum: vec![Rgb64::ZERO; leaf.len()],
+                squares: vec![0.0; leaf.len()],
+            },
             straight: vec![Rgb64::ZERO; leaf.len()],
             terms: Vec::new(),
             first: Vec::new(),
@@ -80,7 +83,9 @@ impl Walks {
             let direct = rgb64(visit.direct);
             walks.direct.sum[patch] += direct;
             walks.direct.squares[patch] += direct.element_sum().powi(2);
-            walks.stray[patch] += rgb64(visit.stray);
+            let stray = rgb64(visit.stray);
+            walks.stray.sum[patch] += stray;
+            walks.stray.squares[patch] += stray.element_sum().powi(2);
         }
         let term = |t: &trace::Term| Term {
             from: from[t.from as usize],
@@ -121,7 +126,7 @@ impl Walks {
     pub fn arriving(&self, irradiance: &[Rgb64]) -> Arrived {
         let of = |patch: usize| {
             let range = self.first[patch] as usize..self.first[patch + 1] as usize;
-            let (mut sum, mut squares) = (self.stray[patch], 0.0);
+            let (mut sum, mut squares) = (Rgb64::ZERO, 0.0);
             for t in &self.terms[range] {
                 let e = self.brought(t, irradiance);
                 sum += e;
