@@ -153,11 +153,12 @@ impl Field {
         /// Share of the light that counts as arriving even if links bring less: all may come through glass.
         const LEAST: f64 = 0.01;
         let given = tree.emitted_power().max_element() / tree.nodes[0].area;
-        let mean = self.irradiance[0].max_element().max(LEAST * given);
+        let mean = self.irradiance[0].max_element();
         if mean.is_nan() || mean <= 0.0 {
             self.usual = vec![self.radiosity[0].max_element(); tree.nodes.len()];
             return;
         }
+        let mean = mean.max(LEAST * given);
         // Means of logarithms, pulled up from the patches.
         let floor = |e: Rgb64| e.max_element().max(black * mean).ln();
         let mut logs: Vec<f64> = self.irradiance.iter().map(|e| floor(*e)).collect();
