@@ -222,6 +222,45 @@ fn a_final_gather_agrees_with_path_tracing() {
     }
 }
 
+/// Links alone would not be made: no surface has light by them.
+#[test]
+fn a_room_lit_through_a_pane_alone_has_its_light() {
+    let wall = |place: &str| {
+        format!(
+            r#"<shape type="rectangle"><transform name="to_world">{place}</transform>
+            <bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="0.8"/></bsdf></bsdf></shape>"#
+        )
+    };
+    // Low, with a window as high as a wall.
+    let walls = [
+        r#"<rotate x="1" angle="-90"/><scale x="2" y="1" z="2"/><translate y="-1"/>"#,
+        r#"<rotate x="1" angle="90"/><scale x="2" y="1" z="2"/><translate y="1"/>"#,
+        r#"<rotate y="1" angle="90"/><scale x="1" y="1" z="2"/><translate x="-2"/>"#,
+        r#"<rotate y="1" angle="-90"/><scale x="1" y="1" z="2"/><translate x="2"/>"#,
+        r#"<scale x="2" y="1" z="1"/><translate z="-2"/>"#,
+        r#"<scale x="0.8" y="1" z="1"/><translate x="1.2" z="2"/>"#,
+        r#"<scale x="0.8" y="1" z="1"/><translate x="-1.2" z="2"/>"#,
+    ];
+    let pane = r#"<shape type="rectangle"><transform name="to_world"><scale x="0.4" y="1" z="1"/>
+        <translate z="2"/></transform><bsdf type="thindielectric"/></shape>
+        <emitter type="constant"><rgb name="radiance" value="1"/></emitter>"#;
+    let camera = camera(12, 60.0).replace(
+        r#"origin="0, 0, 4" target="0, 0, 0""#,
+        r#"origin="1.8, 0.5, 1.8" target="0, 0, 0""#,
+    );
+    let mut compiled = compile(&scene(-1, &camera, &(walls.map(wall).concat() + pane)));
+    let spp = 4096;
+    let path = IntegratorSpec::Path(PathSpec::default());
+    let (_, mean, _) = look(&mut compiled, path, spp);
+    let (_, found, _) = look(&mut compiled, cached(gather(None)), spp);
+    let noise = 4.5 * mean.1.hypot(found.1);
+    assert!(
+        (found.0 - mean.0).abs() < 0.01 * mean.0 + noise,
+        "{found:?} {mean:?}"
+    );
+    assert!(noise < 0.02 * mean.0, "{noise} says too little");
+}
+
 #[test]
 fn the_bias_that_is_reported_is_the_one_there_is() {
     for (content, integrator) in [

@@ -201,6 +201,7 @@ fn placeholder() -> TreeNode {
         albedo: Rgb64::ZERO,
         emission: Rgb64::ZERO,
         external: Rgb64::ZERO,
+        stray: Rgb64::ZERO,
         gain: Gain::NONE,
         links: Vec::new(),
     }

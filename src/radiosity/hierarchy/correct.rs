@@ -2,21 +2,15 @@
 
 use super::bodies::Parts;
 use super::gather::Field;
-use super::trace::{Traces, Visit};
-use super::tree::{Gain, Kind, NONE, Tree};
+use super::trace::{Purpose, Traces};
+use super::tree::{Gain, NONE, Tree};
 use super::walks::{Order, Walks};
-use super::{output, refine};
-use crate::math::DVec2;
-use crate::radiosity::{Gloss, Progress, Report, Rgb64, SolveSpec};
+use super::watch::Watch;
+use super::{divide, output, stray};
+use crate::radiosity::{Report, Rgb64, SolveSpec};
 use crate::scene::Scene;
 use rayon::prelude::*;
-use std::ops::ControlFlow;
 
-/// Points of walks for which a patch is divided, at least.
-const POINTS: usize = 16;
-/// Variance between quarters of a patch over that within, times the degrees of freedom of the former: what chance
-/// alone exceeds in one case of a thousand (chi-square, 3 degrees of freedom).
-const SURE: f64 = 16.27;
 /// Steps that all look at the gains; how far walks are trusted is settled then.
 const OFTEN: u64 = 8;
 /// Of those after, one in so many does; and all while light grows, which gains may be the cause of.
@@ -30,7 +24,7 @@ pub fn correct(
     field: &mut Field,
     spec: &SolveSpec,
     report: &mut Report,
-    observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
+    watch: &mut Watch,
 ) -> Vec<Rgb64> {
     let mut walks = walks(scene, tree, field, spec);
     let parts = &Parts::new(tree);
@@ -41,7 +35,8 @@ pub fn correct(
     let direct = corrected(tree, parts, &walks);
     let of_patch = |&leaf: &u32| direct[leaf as usize];
     walks.set_straight(walks.leaf.iter().map(of_patch).collect());
-    let given = stray(tree, &walks, &direct);
+    let strays = stray::of(tree, &walks);
+    let given: Vec<Rgb64> = direct.iter().zip(strays).map(|(d, s)| *d + s).collect();
     let met = walks.met();
     let order = Order::new(tree, Some(parts));
     let irradiance = std::mem::take(&mut field.irradiance);
@@ -76,7 +71,9 @@ pub fn correct(
             let mut seen = reflected.clone();
             seen.spread(tree, parts, None);
             seen.emit(tree);
-            if super::observes(tree, &seen, report, observe).is_break() {
+            (watch.step, watch.residual) = (report.steps, report.residual);
+            watch.show(tree, &seen);
+            if watch.is_stopped() {
                 break;
             }
         }
@@ -98,90 +95,16 @@ pub fn correct(
 fn walks(scene: &Scene, tree: &mut Tree, field: &mut Field, spec: &SolveSpec) -> Walks {
     let (mesh, traced) = output::mesh(tree);
     // Links know nothing of light by mirrors, glass and gloss.
-    let all =
-        spec.gloss != Gloss::LeftOut && (scene.throws_caustics().is_ok() || scene.is_glossy());
+    let all = stray::is_possible(scene, spec);
     let lit = |&node: &u32| all || field.irradiance[node as usize].element_sum() > 0.0;
     let lit: Vec<bool> = traced.leaf.iter().map(lit).collect();
-    let traces = Traces::new(scene, tree, &mesh, &lit, spec);
-    let reflected = |patch: u32| {
-        let node = traced.leaf[patch as usize] as usize;
-        field.irradiance[node]
-    };
-    let brought = traces.brought(reflected);
-    let sample = |(visit, brought): (&Visit, f32)| Sample {
-        node: traced.leaf[visit.at.patch as usize],
-        st: visit.at.st,
-        brought,
-    };
-    let mut samples: Vec<Sample> = traces.visits.iter().zip(brought).map(sample).collect();
-    samples.par_sort_by_key(|s| s.node);
-    let min_size = refine::min_size(tree, spec);
-    for of_one in samples.chunk_by_mut(|a, b| a.node == b.node) {
-        divide(scene, tree, of_one, min_size);
-    }
+    let traces = Traces::new(scene, tree, &mesh, &lit, spec, Purpose::Correct);
+    let irradiance = |patch: u32| field.irradiance[traced.leaf[patch as usize] as usize];
+    let brought = traces.brought(irradiance);
+    divide::by_visits(scene, tree, &traces, &traced.leaf, &brought, spec);
     field.grow(tree);
     let (_, now) = output::mesh(tree);
     Walks::new(tree, traces, &traced.leaf, now.leaf)
-}
-
-/// What comes to a point of a leaf, which is given in the coordinates of its piece.
-struct Sample {
-    node: u32,
-    st: [f32; 2],
-    /// By the first solution: in W/m², summed over the channels.
-    brought: f32,
-}
-
-/// Divides the leaf of `samples` into quarters, and these again, as long as what comes to them differs.
-fn divide(scene: &Scene, tree: &mut Tree, samples: &mut [Sample], min_size: f64) {
-    let Some(&Sample { node, .. }) = samples.first() else {
-        return;
-    };
-    let Kind::Surface { piece, .. } = tree.nodes[node as usize].kind else {
-        return;
-    };
-    if samples.len() < POINTS {
-        return;
-    }
-    // By quarter: number, sum and sum of squares.
-    let mut sums = [[0.0; 3]; 4];
-    let quarter_of = |sample: &Sample| {
-        let st = DVec2::from_array(sample.st.map(f64::from));
-        piece.outline.child_at(st)
-    };
-    for sample in samples.iter() {
-        let (x, sums) = (f64::from(sample.brought), &mut sums[quarter_of(sample).0]);
-        for (sum, more) in sums.iter_mut().zip([1.0, x, x * x]) {
-            *sum += more;
-        }
-    }
-    if !differ(&sums) || !tree.divide(scene, node, min_size) {
-        return;
-    }
-    let first = tree.nodes[node as usize].quarters;
-    for sample in samples.iter_mut() {
-        let (quarter, inside) = quarter_of(sample);
-        sample.node = first + quarter as u32;
-        sample.st = inside.as_vec2().to_array();
-    }
-    samples.sort_by_key(|s| s.node);
-    for of_one in samples.chunk_by_mut(|a, b| a.node == b.node) {
-        divide(scene, tree, of_one, min_size);
-    }
-}
-
-/// Whether means differ by more than chance makes them: number, sum and sum of squares of each are given.
-fn differ(sums: &[[f64; 3]; 4]) -> bool {
-    let whole: [f64; 3] = std::array::from_fn(|i| sums.iter().map(|s| s[i]).sum());
-    let mean = whole[1] / whole[0];
-    let filled = sums.iter().filter(|s| s[0] > 0.0);
-    let between: f64 = filled
-        .clone()
-        .map(|[n, sum, _]| n * (sum / n - mean).powi(2))
-        .sum();
-    let within = whole[2] - whole[0] * mean * mean - between;
-    let freedom = whole[0] - filled.count() as f64;
-    freedom > 0.0 && between * freedom > SURE * within
 }
 
 /// Irradiance that links bring straight from emitters, by node.
@@ -193,7 +116,10 @@ pub fn straight(tree: &Tree, parts: &Parts) -> Vec<Rgb64> {
         let node = &tree.nodes[leaf as usize];
         direct[leaf as usize] = node.gain.of(linked) + node.external;
     }
-    let of = |&leaf: &u32| emission.irradiance_in_body(tree, parts, leaf);
+    let of = |&leaf: &u32| {
+        let stray = tree.nodes[leaf as usize].stray;
+        emission.irradiance_in_body(tree, parts, leaf) - stray
+    };
     let in_bodies: Vec<Rgb64> = parts.leaves.par_iter().map(of).collect();
     for (&leaf, found) in parts.leaves.iter().zip(in_bodies) {
         direct[leaf as usize] = found;
@@ -216,24 +142,6 @@ fn corrected(tree: &Tree, parts: &Parts, walks: &Walks) -> Vec<Rgb64> {
         direct[leaf as usize] = gain.of(direct[leaf as usize]);
     }
     direct
-}
-
-/// `direct` (by node) and what comes from emitters by mirrors, glass and gloss, as far as walks tell: links, and what
-/// corrects them, know nothing of that.
-fn stray(tree: &Tree, walks: &Walks, direct: &[Rgb64]) -> Vec<Rgb64> {
-    let mut given = direct.to_vec();
-    if walks.stray.squares.iter().all(|s| *s == 0.0) {
-        return given;
-    }
-    let order = Order::new(tree, None);
-    // Where little is known, as much as around.
-    let same = vec![Rgb64::ONE; walks.leaf.len()];
-    let (gains, _) = walks.gains(tree, &order, &walks.stray, &same, None);
-    for &leaf in &walks.leaf {
-        let gain = gains[order.number[leaf as usize] as usize];
-        given[leaf as usize] += gain.of(Rgb64::ONE);
-    }
-    given
 }
 
 /// What links bring to patches that walks met, and their irradiance: by patch.

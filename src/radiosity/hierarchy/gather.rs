@@ -33,7 +33,7 @@ impl Field {
     pub fn new(tree: &Tree) -> Field {
         let mut field = Field::of(tree, None);
         for (b, node) in field.radiosity.iter_mut().zip(&tree.nodes) {
-            *b = node.emission + node.albedo * node.external;
+            *b = node.emission + node.albedo * node.unlinked();
         }
         field.pull(tree);
         field
@@ -87,7 +87,7 @@ impl Field {
     fn apart(&self, tree: &Tree, leaf: u32) -> Rgb64 {
         match &self.given {
             Some(given) => given[leaf as usize],
-            None => tree.nodes[leaf as usize].external,
+            None => tree.nodes[leaf as usize].unlinked(),
         }
     }
 
@@ -139,7 +139,7 @@ impl Field {
             let same = node.albedo == parent.albedo && node.emission == parent.emission;
             self.radiosity.push(match same {
                 true => self.radiosity[node.parent as usize],
-                false => node.emission + node.albedo * irradiance.max(node.external),
+                false => node.emission + node.albedo * irradiance.max(node.unlinked()),
             });
             self.irradiance.push(irradiance);
             let usual = self.usual[node.parent as usize];

@@ -13,11 +13,13 @@ mod balance;
 mod bodies;
 mod cluster;
 mod correct;
+mod divide;
 mod estimate;
 mod gather;
 mod output;
 mod refine;
 mod sphere;
+mod stray;
 mod trace;
 mod tree;
 mod walks;
@@ -92,6 +94,7 @@ pub fn solve(
         mesh_seconds: start.elapsed().as_secs_f64(),
         ..Report::default()
     };
+    stray::find(scene, &mut tree, spec);
     let mut refiner = Refiner::new(scene, &surfaces, spec, &mut tree);
     let emitted = tree.emitted_power();
     let mut field = Field::new(&tree);
@@ -160,7 +163,7 @@ pub fn solve(
             &mut field,
             spec,
             &mut report,
-            watch.observe,
+            &mut watch,
         ));
         report.solve_seconds += clock.elapsed().as_secs_f64();
     }
@@ -185,22 +188,4 @@ pub fn solve(
     };
     let _ = (watch.observe)(&last);
     Ok(solution)
-}
-
-/// Shows the state between two refinements.
-fn observes(
-    tree: &Tree,
-    field: &Field,
-    report: &Report,
-    observe: &mut dyn FnMut(&Progress) -> ControlFlow<()>,
-) -> ControlFlow<()> {
-    let (mesh, numbers) = output::mesh(tree);
-    let radiosity = output::by_patch(&numbers, &field.radiosity);
-    observe(&Progress {
-        step: report.steps,
-        mesh: &mesh,
-        radiosity: &radiosity,
-        ambient: Rgb64::ZERO,
-        residual: report.residual,
-    })
 }

@@ -77,8 +77,10 @@ impl<'a> Refiner<'a> {
             dormant: vec![(0, 0)],
             links: 0,
         };
-        let cells = tree.cells.clone();
-        refiner.light(tree, &cells);
+        let surfaces =
+            (0..tree.nodes.len() as u32).filter(|n| !tree.nodes[*n as usize].is_cluster());
+        let surfaces: Vec<u32> = surfaces.collect();
+        refiner.light(tree, &surfaces);
         refiner
     }
 

@@ -19,6 +19,34 @@ const LONGEST: u32 = 8;
 /// Mirrors, glass and gloss in a row, at most.
 const PASSES: u32 = 8;
 
+/// What walks are for.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Purpose {
+    /// To see roughly what comes by mirrors, glass and gloss.
+    Stray,
+    /// To correct what links bring.
+    Correct,
+}
+
+impl Purpose {
+    fn edges(self, spec: &SolveSpec) -> u64 {
+        /// Of all edges, one in so many is worth a first look.
+        const LOOK: u64 = 8;
+        match self {
+            Purpose::Stray => spec.walks.div_ceil(LOOK),
+            Purpose::Correct => spec.walks,
+        }
+    }
+
+    /// Of random numbers.
+    fn stream(self) -> u64 {
+        match self {
+            Purpose::Stray => u64::MAX - 2,
+            Purpose::Correct => u64::MAX - 1,
+        }
+    }
+}
+
 /// What walks met, in the order of the walks.
 #[derive(Default)]
 pub struct Traces {
@@ -67,7 +95,9 @@ impl Traces {
         mesh: &PatchMesh,
         lit: &[bool],
         spec: &SolveSpec,
+        purpose: Purpose,
     ) -> Traces {
+        let (wanted, stream) = (purpose.edges(spec), purpose.stream());
         let mut sum = 0.0;
         let area = |(patch, lit): (&Patch, &bool)| {
             sum += if *lit { patch.area } else { 0.0 };
@@ -75,7 +105,7 @@ impl Traces {
         };
         let sums: Vec<f64> = mesh.patches.iter().zip(lit).map(area).collect();
         let walk = |i: u64| {
-            let sampler = Sampler::new(SamplerKind::Sobol, spec.seed, u64::MAX - 1, i, 1);
+            let sampler = Sampler::new(SamplerKind::Sobol, spec.seed, stream, i, 1);
             let [x, y, pick, _] = sampler.get4(0);
             let at = f64::from(pick) * sum;
             let patch = sums.partition_point(|s| *s <= at).min(sums.len() - 1);
@@ -101,12 +131,12 @@ impl Traces {
             return all;
         }
         let (mut made, mut number) = (0, 0);
-        while made < spec.walks && number < spec.walks {
+        while made < wanted && number < wanted {
             // As many as it takes by what walks were so far, but at least a fair part of all.
-            let missing = (spec.walks - made) as f64;
+            let missing = (wanted - made) as f64;
             let each = (made as f64 / number as f64).clamp(0.1, f64::from(LONGEST));
             let round = match number {
-                0 => spec.walks.div_ceil(2 * u64::from(LONGEST)),
+                0 => wanted.div_ceil(2 * u64::from(LONGEST)),
                 _ => (missing / each).ceil() as u64,
             };
             let found: Vec<Traces> = (number..number + round).into_par_iter().map(walk).collect();

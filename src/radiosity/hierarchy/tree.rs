@@ -37,6 +37,8 @@ pub struct TreeNode {
     pub emission: Rgb64,
     /// Irradiance from lights that are no patches, in W/m².
     pub external: Rgb64,
+    /// From emitters by mirrors, glass and gloss, in W/m², as known before there are links (see [`super::stray`]).
+    pub stray: Rgb64,
     /// What becomes of what links bring to a patch, or to a body.
     pub gain: Gain,
     pub links: Vec<TreeLink>,
@@ -171,7 +173,7 @@ impl Tree {
     pub fn emitted_power(&self) -> Rgb64 {
         let power = |&cell: &u32| {
             let n = &self.nodes[cell as usize];
-            (n.emission + n.albedo * n.external) * n.area
+            (n.emission + n.albedo * n.unlinked()) * n.area
         };
         self.cells.iter().map(power).sum()
     }
@@ -221,7 +223,7 @@ impl Tree {
         }
         let shape = self.surfaces.facets()[facet as usize].shape;
         let (varies, albedo, emission) = (scene.varies(shape), parent.albedo, parent.emission);
-        let external = parent.external;
+        let (external, stray) = (parent.external, parent.stray);
         let first = self.nodes.len() as u32;
         for quarter in 0..4 {
             let piece = piece.child(quarter);
@@ -233,7 +235,7 @@ impl Tree {
                 false => (albedo, emission),
             };
             let mut child = TreeNode::surface(node, facet, piece, albedo, emission);
-            child.external = external;
+            (child.external, child.stray) = (external, stray);
             self.nodes.push(child);
         }
         self.nodes[node as usize].quarters = first;
@@ -263,9 +265,15 @@ impl TreeNode {
             albedo,
             emission,
             external: Rgb64::ZERO,
+            stray: Rgb64::ZERO,
             gain: Gain::NONE,
             links: Vec::new(),
         }
+    }
+
+    /// Irradiance that comes by no link, in W/m².
+    pub fn unlinked(&self) -> Rgb64 {
+        self.external + self.stray
     }
 
     pub fn is_cluster(&self) -> bool {

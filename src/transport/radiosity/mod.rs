@@ -72,7 +72,6 @@ impl Default for CacheSpec {
                 walks: CACHE_WALKS,
                 lit_only: true,
                 contacts: true,
-                residual: CACHE_RESIDUAL,
                 gloss: Gloss::All,
                 ..SolveSpec::default()
             },
@@ -86,8 +85,6 @@ impl Default for CacheSpec {
 const GATHER_ERROR: f64 = 1e-2;
 /// Edges of these walks: what is read is averaged over many patches.
 const CACHE_WALKS: u64 = 1 << 19;
-/// Share of the light that may still be under way in a cache.
-const CACHE_RESIDUAL: f64 = 1e-3;
 
 /// Path tracing with radiosity to help it.
 #[derive(Clone, Debug, Default, PartialEq)]
