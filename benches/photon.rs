@@ -155,6 +155,7 @@ fn bench_shooting(criterion: &mut Criterion) {
                 sampler: SamplerKind::Sobol,
                 seed: 0,
                 replicates: 1,
+                planned: None,
             },
             walk: LightWalk {
                 scene: &job.scene,

@@ -4,9 +4,12 @@
 #[path = "common/render.rs"]
 mod render;
 
+use luxel::film::Film;
 use luxel::format::{Compiled, Overrides};
+use luxel::render::{Stats, Stop};
 use luxel::transport::{CacheSpec, CachedSpec, Indirect, IntegratorSpec, PathSpec};
 use render::{camera, compile_with, mean_of, scene};
+use std::ops::ControlFlow;
 
 /// A room, open to the camera, with a block that throws a shadow.
 fn room(content: &str) -> String {
@@ -135,8 +138,10 @@ fn rendered(xml: &str, threads: usize) -> (Vec<[f64; 3]>, bool) {
         spec.cache.always = false;
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    let (film, stats) = pool.unwrap().install(|| render::render(&compiled, 4));
-    (film.mean(), stats.solution.is_some())
+    // Samples that may be followed by any number.
+    let mut film = compiled.job.new_film(Stop::Spp(4));
+    let stats = pool.unwrap().install(|| compiled.job.add_samples(&mut film, 4));
+    (film.mean(), stats.unwrap().solution.is_some())
 }
 
 #[test]
@@ -158,4 +163,24 @@ fn nothing_is_solved_for_direct_light() {
     let (picture, solved) = rendered(&lamp, 1);
     assert!(solved);
     assert_eq!(picture, rendered(&lamp, 4).0);
+}
+
+#[test]
+fn nothing_is_solved_for_a_short_picture() {
+    let lamp = room(LAMP).replace("\"16\"", "\"48\"");
+    let solved = |spp: u64| {
+        let mut compiled = compiled(&lamp, Indirect::Guide, 5);
+        if let IntegratorSpec::Cached(spec) = &mut compiled.job.integrator {
+            spec.cache.always = false;
+        }
+        let on_pass = |film: &Film, _: &Stats| match film.spp() {
+            0 => ControlFlow::Continue(()),
+            _ => ControlFlow::Break(()),
+        };
+        let (_, stats) = compiled.job.render(Stop::Spp(spp), on_pass).unwrap();
+        stats.solution.is_some()
+    };
+    // What is solved takes as long as some 6,000 samples of such small pictures.
+    assert!(!solved(500));
+    assert!(solved(100_000));
 }

@@ -204,6 +204,7 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
         );
         image_io::write_atomic(path, text.as_bytes())?;
     }
+    warn_of_bias(cache_bias(&film, &stats));
     eprintln!("{}", summary(&film, &stats, &outputs));
     report_invalid(&stats);
     Ok(if stopped.load(Ordering::Relaxed) {
@@ -279,6 +280,24 @@ fn cache_bias(film: &Film, stats: &Stats) -> Option<[f64; 2]> {
     let mean = film.mean().iter().map(luminance).sum::<f64>() / pixels as f64;
     let bias = stats.bias.mean(pixels * film.spp())?;
     (mean > 0.0).then(|| bias.map(|b| b / mean))
+}
+
+/// Bias, as a share of the picture's mean, and standard errors of it, from which on it is worth a warning.
+const MUCH_BIAS: [f64; 2] = [0.05, 4.0];
+
+/// Says so where reading radiosity made the picture much brighter or darker.
+fn warn_of_bias(bias: Option<[f64; 2]>) {
+    let [much, sure] = MUCH_BIAS;
+    if let Some([mean, stderr]) = bias
+        && mean.abs() > much.max(sure * stderr)
+    {
+        eprintln!(
+            "warning: the picture is too {} by {:.0} % in the mean, since radiosity is too coarse: give it more walks, or \
+             use --indirect guide or none",
+            if mean > 0.0 { "bright" } else { "dark" },
+            100.0 * mean.abs()
+        );
+    }
 }
 
 /// One line: what was done, how fast, and how large the error is.

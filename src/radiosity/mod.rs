@@ -260,10 +260,16 @@ impl fmt::Display for SolveError {
             SolveError::NoPatches => {
                 f.write_str("no surface of the scene reflects diffusely or shines")
             }
-            SolveError::TooManyPatches { patches, limit } => write!(
-                f,
-                "{patches} patches are more than the {limit} that are allowed: make patches larger"
-            ),
+            SolveError::TooManyPatches { patches, limit } => {
+                match *patches {
+                    u64::MAX => f.write_str("more patches than can be counted")?,
+                    n => write!(f, "{n} patches")?,
+                }
+                write!(
+                    f,
+                    " are more than the {limit} that are allowed: make patches larger"
+                )
+            }
             SolveError::TooLarge {
                 solver,
                 patches,
@@ -275,7 +281,8 @@ impl fmt::Display for SolveError {
                 bytes >> 20
             ),
             SolveError::NoAbsorption => f.write_str(
-                "the scene is closed and absorbs nothing: its radiosity grows without limit",
+                "the scene is closed and absorbs nothing: its radiosity grows without limit; give a surface a reflectance \
+                 below 1, or leave an opening",
             ),
             SolveError::Unbounded { solver } => write!(
                 f,

@@ -141,8 +141,8 @@ pub(super) fn doubts(report: &Report, asked: f64) -> Vec<String> {
     // What is scattered in other ways counts as absorbed wherever it arrives; and what still grows says nothing.
     if report.converged && report.other <= NEGLIGIBLE && absorbed > given * (1.0 + MADE) {
         doubts.push(format!(
-            "patches absorb {:.3} times the light that there is: surfaces that coincide, or lights much smaller \
-             than patches; use a smaller min_size",
+            "patches absorb {:.3} times the light that there is: surfaces that coincide get it twice (leave one of them \
+             out), or lights are much smaller than patches (use a smaller min_size or patch_size)",
             absorbed / given
         ));
     }

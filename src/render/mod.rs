@@ -182,10 +182,7 @@ const PASS: Duration = Duration::from_millis(400);
 impl Job {
     /// An empty film for this job.
     pub fn new_film(&self, stop: Stop) -> Film {
-        let spp = match stop {
-            Stop::Spp(n) => Some(n),
-            Stop::Time(_) => None,
-        };
+        let spp = planned(stop);
         let crop = self.film.crop;
         let pixels = u64::from(crop.width) * u64::from(crop.height);
         let channels = self.aovs.iter().map(|l| l.aov.channels().len()).sum();
@@ -209,7 +206,7 @@ impl Job {
         let start = Instant::now();
         let mut film = self.new_film(stop);
         let mut stats = Stats::default();
-        let transport = self.transport(film.replicates());
+        let transport = self.transport(film.replicates(), planned(stop));
         stats.phases.setup = start.elapsed().as_secs_f64();
         let solved = transport.prepare(&mut |progress| {
             stats.seconds = start.elapsed().as_secs_f64();
@@ -238,11 +235,11 @@ impl Job {
     /// Whether what the integrator keeps beside the film fits into the memory that it may take; if not, what is
     /// wrong.
     pub fn fits(&self) -> Result<(), String> {
-        self.transport(1).fits()
+        self.transport(1, None).fits()
     }
 
     /// The integrator, ready to take samples.
-    fn transport(&self, replicates: u32) -> Transport<'_> {
+    fn transport(&self, replicates: u32, planned: Option<u64>) -> Transport<'_> {
         let setting = Setting {
             scene: &self.scene,
             camera: &self.camera,
@@ -250,6 +247,7 @@ impl Job {
             sampler: self.sampler,
             seed: self.seed,
             replicates,
+            planned,
         };
         Transport::new(&self.integrator, setting)
     }
@@ -260,7 +258,7 @@ impl Job {
     /// As of [`Job::render`].
     pub fn add_samples(&self, film: &mut Film, n: u64) -> Result<Stats, RenderError> {
         let start = Instant::now();
-        let transport = self.transport(film.replicates());
+        let transport = self.transport(film.replicates(), None);
         let setup = start.elapsed().as_secs_f64();
         let solved = transport.prepare(&mut |_| ControlFlow::Continue(()));
         let radiosity = solved.map_err(RenderError::Radiosity)?;
@@ -421,6 +419,14 @@ impl Pass<'_> {
             }
         }
         (ledger, invalid)
+    }
+}
+
+/// Samples per pixel, where they are known before.
+fn planned(stop: Stop) -> Option<u64> {
+    match stop {
+        Stop::Spp(n) => Some(n),
+        Stop::Time(_) => None,
     }
 }
 

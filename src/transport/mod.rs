@@ -203,6 +203,8 @@ pub struct Setting<'a> {
     pub seed: u64,
     /// That the samples of a pixel are dealt out to (see [`crate::sampler`]).
     pub replicates: u32,
+    /// Samples that each pixel is to get, where that is known: what is prepared must be worth its while.
+    pub planned: Option<u64>,
 }
 
 impl Setting<'_> {

@@ -28,6 +28,7 @@ fn setting(compiled: &Compiled) -> Setting<'_> {
         sampler: SamplerKind::Sobol,
         seed: 1,
         replicates: 1,
+        planned: None,
     }
 }
 

@@ -38,7 +38,7 @@ pub(super) fn table(spec: &SolveSpec, solution: &Solution, seconds: &Seconds) ->
         "residual",
         format!("{:.2e} of the emitted power{reached}", r.residual),
     ));
-    lines.extend(balance(solution));
+    lines.extend(balance(spec, solution));
     lines.push((
         "seconds",
         format!(
@@ -66,7 +66,7 @@ fn form_factors(method: FormFactorMethod) -> String {
 }
 
 /// Where the energy comes from and where it goes, summed over the channels.
-fn balance(solution: &Solution) -> Vec<(&'static str, String)> {
+fn balance(spec: &SolveSpec, solution: &Solution) -> Vec<(&'static str, String)> {
     let r = &solution.report;
     let watts = |x: Rgb64| x.element_sum();
     let all = watts(r.emitted) + watts(r.external);
@@ -78,18 +78,22 @@ fn balance(solution: &Solution) -> Vec<(&'static str, String)> {
         return vec![("emitted", from)];
     }
     let share = |x: Rgb64| 100.0 * watts(x) / all;
-    vec![
-        ("emitted", from),
-        (
-            "balance",
-            format!(
-                "{:.2} % absorbed, {:.2} % escaped, {:+.2} % missing",
-                share(r.absorbed),
-                share(r.escaped),
-                100.0 - share(r.absorbed) - share(r.escaped)
-            ),
+    let (absorbed, escaped) = (share(r.absorbed), share(r.escaped));
+    let swallows = solution.mesh.surfaces.left_out.share() > 0.0 || r.other > 0.0;
+    let to = match (spec.solver, swallows) {
+        // What escapes is known by what did not stay.
+        (Solver::Hierarchical, false) => {
+            format!("{absorbed:.2} % absorbed, {escaped:.2} % escaped or missing")
+        }
+        (Solver::Hierarchical, true) => format!(
+            "{absorbed:.2} % absorbed, {escaped:.2} % escaped, missing, or met what has no patches"
         ),
-    ]
+        _ => format!(
+            "{absorbed:.2} % absorbed, {escaped:.2} % escaped, {:+.2} % missing",
+            100.0 - absorbed - escaped
+        ),
+    };
+    vec![("emitted", from), ("balance", to)]
 }
 
 /// Prints as much as the reader takes: a pipe that closes early is no fault.

@@ -110,11 +110,15 @@ impl ColoredMesh {
         let bright = bright.filter(|(_, c)| c.max_element() > 1.0);
         let bright: f64 = bright.map(|(p, _)| p.area).sum();
         let triangles = display.triangles(mesh, spec.shading == Shading::Gouraud);
+        let positions: Vec<DVec3> = triangles.vertices.iter().map(|v| v.position).collect();
+        let has_area = |corners: &[u32; 3]| !is_flat(corners.map(|i| positions[i as usize]));
+        let with_area = triangles.triangles.iter().copied().filter(has_area);
+        let with_area: Vec<[u32; 3]> = with_area.collect();
         ColoredMesh {
-            positions: triangles.vertices.iter().map(|v| v.position).collect(),
+            positions,
             normals: triangles.vertices.iter().map(|v| v.normal).collect(),
             colors: display.values(&triangles, &colors),
-            triangles: triangles.triangles,
+            triangles: with_area,
             center,
             clipped: bright / mesh.area(),
         }
@@ -157,6 +161,13 @@ impl ColoredMesh {
         let bytes = self.encode(format, up).map_err(fault)?;
         image_io::write_atomic(path, &bytes)
     }
+}
+
+/// Whether a triangle has no area in single precision, as slivers between the edges of shadows: its neighbours meet
+/// there without it.
+fn is_flat(corners: [DVec3; 3]) -> bool {
+    let [a, b, c] = corners.map(|p| p.as_vec3().as_dvec3());
+    (b - a).cross(c - a).length_squared() <= 0.0
 }
 
 /// In single precision, finite: what is too large becomes the largest.

@@ -289,7 +289,7 @@ impl<'a> CachedPath<'a> {
             setting: self.setting,
         };
         let asks = self.guides && !self.always && !self.solving.is_settled();
-        if asks && !pilot.is_worth_a_solution() {
+        if asks && !pilot.is_worth_a_solution(self.solving.walks()) {
             self.solving.skip();
         }
         self.solving.prepare(observe)?;

@@ -26,11 +26,18 @@ const LEFT_OUT: f64 = 0.002;
 const BLOCK: usize = 4;
 /// What differs is relative to what is seen plus this share of its mean over the film, squared.
 const DARK: f64 = 0.1;
-/// Cost of a ray of a walk that is ended by radiosity, and of one that it also guides, over that of a plain walk:
-/// what is met has to be found among the patches, and then in a table. Measured in rooms of 3,000 to 500,000 patches:
-/// 1.1 to 1.4, and 1.33 to 1.46.
-const ENDED: f64 = 1.25;
-const GUIDED: f64 = 1.45;
+/// Time of a ray of a plain walk, in a scene of so many triangles: a part that is always the same, and one for each
+/// doubling. Measured in three rooms: 180 ns with 38 triangles, 335 ns with 380,000; the unit does not matter.
+const RAY: [f64; 2] = [120.0, 11.6];
+/// What comes to it where the walk is ended by radiosity, and where that also guides it: what is met has to be found
+/// among the patches, and then in a table.
+const ENDED: f64 = 80.0;
+const GUIDED: f64 = 155.0;
+/// What a solution and the tables to guide by take, in rays of plain walks: for each edge of the solution's walks, and
+/// for each triangle. Measured in these rooms: 5 to 29 million rays, predicted 5 to 28.
+const SOLVED: [f64; 2] = [9.0, 60.0];
+/// What is prepared may take this share of what the picture takes: so much is lost if it helps nothing.
+const AFFORDABLE: f64 = 0.2;
 /// What longer paths add to the variance of direct light must be more than this share of it for a solution to be worth
 /// its while: measured, guiding won no more than 1.05 times below, and 1.2 to 2.2 times from a share of 4 on.
 const LEAST: f64 = 1.0;
@@ -61,8 +68,11 @@ impl Pilot<'_> {
     pub fn choose(&self, guide: &Guide) -> Help {
         let ways = [
             (Help::None, 1.0),
-            (Help::By(Guided::EndsOnly), ENDED),
-            (Help::By(Guided::Everywhere), GUIDED),
+            (Help::By(Guided::EndsOnly), 1.0 + ENDED / self.time_of_ray()),
+            (
+                Help::By(Guided::Everywhere),
+                1.0 + GUIDED / self.time_of_ray(),
+            ),
         ];
         let found = ways.map(|(way, _)| {
             self.fly(|ray, sampler, stats| self.walk(way, guide, ray, sampler, stats))
@@ -80,8 +90,9 @@ impl Pilot<'_> {
         }
     }
 
-    /// Whether reflections between surfaces make so much of the noise that guiding may pay.
-    pub fn is_worth_a_solution(&self) -> bool {
+    /// Whether reflections between surfaces make so much of the noise that guiding may pay, in a picture that takes
+    /// much longer than a solution of `edges` of walks.
+    pub fn is_worth_a_solution(&self, edges: u64) -> bool {
         let scene = self.setting.scene;
         let direct = PathSpec {
             max_depth: Some(2),
@@ -91,7 +102,22 @@ impl Pilot<'_> {
             self.fly(|ray, sampler, stats| path.li(scene, ray, sampler, stats).radiance.luminance())
         });
         let [all, direct] = self.variances(&found);
-        all > (1.0 + LEAST) * direct
+        let crop = &self.setting.film.crop;
+        let walks = found[0].len() as f64 * f64::from(SETS * WALKS);
+        let rays = found[0].iter().map(|f| f.rays).sum::<u64>() as f64 / walks;
+        let pixels = f64::from(crop.width) * f64::from(crop.height);
+        let [of_edge, of_triangle] = SOLVED;
+        let solved = of_edge * edges as f64 + of_triangle * self.triangles();
+        let is_long = |spp: u64| AFFORDABLE * spp as f64 * pixels * rays >= solved;
+        all > (1.0 + LEAST) * direct && self.setting.planned.is_none_or(is_long)
+    }
+
+    fn triangles(&self) -> f64 {
+        self.setting.scene.counts().triangles as f64
+    }
+
+    fn time_of_ray(&self) -> f64 {
+        RAY[0] + RAY[1] * self.triangles().max(1.0).log2()
     }
 
     fn walk(

@@ -199,6 +199,11 @@ impl<'a> Solving<'a> {
         let _ = self.made.get_or_init(|| Ok(None));
     }
 
+    /// Edges of walks that solving takes.
+    pub fn walks(&self) -> u64 {
+        self.spec.walks
+    }
+
     /// Whether the solution, or that there is none, is known already.
     pub fn is_settled(&self) -> bool {
         self.given.is_some() || self.made.get().is_some()
