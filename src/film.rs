@@ -1,17 +1,25 @@
-//! The film: per pixel and replicate the sum of its samples, in f64, and what follows from the spread of
-//! the replicates: standard errors and the estimated error of the whole image.
+//! The film: per pixel and replicate the sum of its samples, and what follows from the spread of the replicates:
+//! standard errors and the estimated error of the whole image. Sums are exact, so that a picture made in parts is the
+//! same as one that was made at once.
 
 mod estimate;
+mod exact;
 mod filter;
 mod parts;
+mod planes;
 mod splat;
+mod taken;
 
-pub use estimate::{ErrorEstimate, student_t_95};
+pub use estimate::{ErrorEstimate, TileError, student_t_95};
+pub use exact::Sum;
 pub use filter::{Filter, FilterSampler};
 pub use parts::PartMoments;
+pub use planes::{PlaneError, Planes};
 pub use splat::{Splat, SplatBand, SplatBuffer};
+pub use taken::Taken;
 
 use crate::math::Rgb;
+use std::ops::Range;
 
 /// Side of a square tile, in pixels.
 pub const TILE: u32 = 16;
@@ -42,7 +50,7 @@ const MAX_REPLICATES: u32 = 16;
 /// Samples a replicate should have: splitting a few quasi-random points up further would cost more of
 /// their accuracy than the better knowledge of it is worth.
 const SAMPLES_PER_REPLICATE: u64 = 64;
-/// Sums that may stand in memory before the number of replicates is lowered: 64 Mi sums are 1.5 GiB.
+/// Sums that may stand in memory before the number of replicates is lowered: 64 Mi sums are 3 GiB.
 const MAX_SUMS: u64 = 64 << 20;
 
 /// How many replicates the samples of a pixel are dealt out to: 16 from 1024 samples on. `spp` is `None`
@@ -64,8 +72,8 @@ pub fn replicates(spp: Option<u64>, pixels: u64) -> u32 {
 
 /// Sums over the samples of one pixel.
 struct PixelSums<'a> {
-    rgb: &'a mut [[f64; 3]],
-    aov: &'a mut [f64],
+    rgb: &'a mut [[Sum; 3]],
+    aov: &'a mut [Sum],
 }
 
 /// One square of the film; tiles are filled in parallel, each by one thread at a time.
@@ -78,14 +86,25 @@ pub struct Tile {
     pub height: u32,
     replicates: u32,
     aov_channels: usize,
-    rgb: Vec<[f64; 3]>,
-    aov: Vec<f64>,
+    rgb: Vec<[Sum; 3]>,
+    aov: Vec<Sum>,
     parts: parts::Parts,
+    /// Samples that each of its pixels has received.
+    taken: Taken,
 }
 
 impl Tile {
     pub fn replicates(&self) -> u32 {
         self.replicates
+    }
+
+    pub fn taken(&self) -> &Taken {
+        &self.taken
+    }
+
+    /// Says that each of its pixels has received these samples too.
+    pub fn take(&mut self, more: &Taken) {
+        self.taken.add(more);
     }
 
     fn pixel(&mut self, x: u32, y: u32) -> PixelSums<'_> {
@@ -122,13 +141,30 @@ pub struct Film {
     window: Window,
     replicates: u32,
     aov_channels: usize,
-    /// Samples that every pixel has received.
-    spp: u64,
     tiles: Vec<Tile>,
 }
 
 impl Film {
     pub fn new(window: Window, replicates: u32, aov_channels: usize) -> Film {
+        Film::of(window, replicates, aov_channels, &Taken::Range(0..0))
+    }
+
+    /// A film whose first sample will be number `first`.
+    pub fn from_sample(mut self, first: u64) -> Film {
+        for tile in &mut self.tiles {
+            tile.taken = Taken::Range(first..first);
+        }
+        self
+    }
+
+    /// A film whose tiles get as many samples as each needs, by halves that are independent of each other (see
+    /// [`Taken::Halves`]). There must be at least four replicates.
+    pub fn adaptive(window: Window, replicates: u32, aov_channels: usize) -> Film {
+        debug_assert!(replicates >= 4);
+        Film::of(window, replicates, aov_channels, &Taken::Halves([0, 0]))
+    }
+
+    fn of(window: Window, replicates: u32, aov_channels: usize, taken: &Taken) -> Film {
         let starts =
             |n: u32| (0..n.div_ceil(TILE)).map(move |i| (i * TILE, TILE.min(n - i * TILE)));
         let tiles = starts(window.height)
@@ -142,9 +178,10 @@ impl Film {
                         height,
                         replicates,
                         aov_channels,
-                        rgb: vec![[0.0; 3]; pixels * replicates as usize],
-                        aov: vec![0.0; pixels * aov_channels],
+                        rgb: vec![[Sum::ZERO; 3]; pixels * replicates as usize],
+                        aov: vec![Sum::ZERO; pixels * aov_channels],
                         parts: parts::Parts::default(),
+                        taken: taken.clone(),
                     }
                 })
             })
@@ -153,7 +190,6 @@ impl Film {
             window,
             replicates,
             aov_channels,
-            spp: 0,
             tiles,
         }
     }
@@ -166,18 +202,55 @@ impl Film {
         self.replicates
     }
 
+    /// Samples that every pixel has received; in the mean, where tiles differ.
     pub fn spp(&self) -> u64 {
-        self.spp
+        match self.tiles.first().map(|tile| &tile.taken) {
+            Some(Taken::Range(range)) => range.end - range.start,
+            Some(Taken::Halves(_)) => {
+                let pixels = u64::from(self.window.width) * u64::from(self.window.height);
+                (self.samples() as f64 / pixels.max(1) as f64).round() as u64
+            }
+            None => 0,
+        }
     }
 
-    /// The tiles, to be given samples `spp()..spp() + n` each; then call [`Film::finish_pass`].
+    /// Samples of all pixels together.
+    pub fn samples(&self) -> u64 {
+        let of = |tile: &Tile| tile.taken.count() * u64::from(tile.width * tile.height);
+        self.tiles.iter().map(of).sum()
+    }
+
+    /// Samples of each pixel, row by row.
+    pub fn counts(&self) -> Vec<u64> {
+        self.gather(|tile, _| tile.taken.count())
+    }
+
+    /// Numbers of the samples that every pixel has received; `None` where tiles differ.
+    pub fn range(&self) -> Option<Range<u64>> {
+        match &self.tiles.first()?.taken {
+            Taken::Range(range) => Some(range.clone()),
+            Taken::Halves(_) => None,
+        }
+    }
+
+    /// Number of the sample that is next; 0 where tiles differ.
+    pub fn next_sample(&self) -> u64 {
+        self.range().map_or(0, |range| range.end)
+    }
+
+    /// The tiles, row by row.
+    pub fn tiles(&self) -> &[Tile] {
+        &self.tiles
+    }
+
+    /// The tiles, to be given the same samples from `next_sample()` on each; then call [`Film::finish_pass`].
     pub fn tiles_mut(&mut self) -> &mut [Tile] {
         &mut self.tiles
     }
 
-    /// Adds `values`, row by row, to the sample that is under way (number `spp()`) of every pixel.
+    /// Adds `values`, row by row, to the sample that is under way (number `next_sample()`) of every pixel.
     pub fn add_everywhere(&mut self, values: &[[f64; 3]]) {
-        let replicate = (self.spp & u64::from(self.replicates - 1)) as usize;
+        let replicate = (self.next_sample() & u64::from(self.replicates - 1)) as usize;
         let width = self.window.width as usize;
         for tile in &mut self.tiles {
             for y in 0..tile.height {
@@ -194,28 +267,27 @@ impl Film {
 
     /// Says that every pixel has received `n` more samples.
     pub fn finish_pass(&mut self, n: u64) {
-        self.spp += n;
+        let next = self.next_sample();
+        for tile in &mut self.tiles {
+            tile.take(&Taken::Range(next..next + n));
+        }
     }
 
     /// The mean of every pixel, row by row.
     pub fn mean(&self) -> Vec<[f64; 3]> {
-        let n = self.spp.max(1) as f64;
         self.gather(|tile, i| {
             let r = self.replicates as usize;
-            let mut sum = [0.0; 3];
-            for replicate in &tile.rgb[i * r..(i + 1) * r] {
-                for c in 0..3 {
-                    sum[c] += replicate[c];
-                }
-            }
-            sum.map(|s| s / n)
+            let sums = &tile.rgb[i * r..(i + 1) * r];
+            std::array::from_fn(|c| tile.taken.mean(|i| sums[i][c], r))
         })
     }
 
     /// The mean of AOV channel `channel` of every pixel, row by row.
     pub fn aov(&self, channel: usize) -> Vec<f64> {
-        let n = self.spp.max(1) as f64;
-        self.gather(|tile, i| tile.aov[i * self.aov_channels + channel] / n)
+        self.gather(|tile, i| {
+            let n = tile.taken.count().max(1) as f64;
+            tile.aov[i * self.aov_channels + channel].value() / n
+        })
     }
 
     /// One value per pixel in row order; `f` gets the tile and the pixel's index within it.

@@ -1,6 +1,6 @@
 //! What the spread of the replicates says about the error of the picture.
 
-use super::Film;
+use super::{Film, Sum, Tile};
 
 /// The estimated error of an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,24 +56,24 @@ impl Spread {
 }
 
 impl Film {
-    /// Number of samples in replicate `r`.
-    fn samples_of(&self, r: usize) -> u64 {
-        let (n, all) = (self.spp, u64::from(self.replicates));
-        n / all + u64::from((r as u64) < n % all)
-    }
-
     /// True when the replicates are enough to tell an error.
     pub fn has_error(&self) -> bool {
-        self.replicates >= 2 && self.spp >= u64::from(self.replicates)
+        !self.tiles.is_empty() && self.tiles.iter().all(Tile::has_error)
+    }
+
+    /// Degrees of freedom of a pixel's standard error.
+    pub fn freedom(&self) -> u32 {
+        match self.range() {
+            Some(_) => self.replicates.saturating_sub(1),
+            None => self.replicates.saturating_sub(2),
+        }
     }
 
     /// The standard error of every pixel, row by row: the square root of the variance of its mean.
     /// Zero when [`Film::has_error`] is false.
     pub fn standard_error(&self) -> Vec<[f64; 3]> {
-        let r = self.replicates as usize;
         self.gather(|tile, i| {
-            let sums = &tile.rgb[i * r..(i + 1) * r];
-            std::array::from_fn(|c| self.spread(sums, c).variance.sqrt())
+            std::array::from_fn(|c| tile.spread(i, c).map_or(0.0, |s| s.variance.sqrt()))
         })
     }
 
@@ -82,21 +82,12 @@ impl Film {
         if !self.has_error() {
             return None;
         }
-        let r = self.replicates as usize;
         let (mut relmse, mut variance, mut count) = (0.0, 0.0, 0.0);
         for tile in &self.tiles {
-            for sums in tile.rgb.chunks_exact(r) {
-                for c in 0..3 {
-                    let s = self.spread(sums, c);
-                    relmse += s.relative();
-                    // The estimate errs by the uncertainty of the variance; the actual squared error of
-                    // this one picture scatters about its expectation by twice the variance squared.
-                    let weight = 1.0 / (s.mean * s.mean + RELMSE_FLOOR);
-                    variance +=
-                        (s.variance_of_variance + 2.0 * s.variance.powi(2)) * weight.powi(2);
-                    count += 1.0;
-                }
-            }
+            let error = tile.error();
+            relmse += error.relative;
+            variance += error.variance;
+            count += error.count;
         }
         let (relmse, half) = (relmse / count, 1.96 * variance.sqrt() / count);
         Some(ErrorEstimate {
@@ -104,26 +95,113 @@ impl Film {
             ci95: [(relmse - half).max(0.0), relmse + half],
         })
     }
+}
 
-    /// `sums` are the replicates of one pixel. A replicate of n_r of the n samples has the variance
-    /// σ²/n_r, so Σ n_r (m_r - m)² / (R - 1) estimates σ², and σ²/n is the variance of the mean.
-    fn spread(&self, sums: &[[f64; 3]], c: usize) -> Spread {
-        if !self.has_error() {
-            let sum: f64 = sums.iter().map(|s| s[c]).sum();
-            let mean = sum / self.spp.max(1) as f64;
-            return Spread {
-                mean,
-                variance: 0.0,
-                variance_of_variance: 0.0,
-                covariance: 0.0,
-            };
+/// Sums over the pixels and channels of a tile.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TileError {
+    /// Of variance / (mean² + 0.01).
+    pub relative: f64,
+    /// Of the variance of that.
+    pub variance: f64,
+    pub count: f64,
+}
+
+impl Tile {
+    fn has_error(&self) -> bool {
+        let r = self.replicates as usize;
+        let least = match self.taken {
+            super::Taken::Range(_) => 2,
+            super::Taken::Halves(_) => 4,
+        };
+        r >= least && (0..r).all(|i| self.taken.of_replicate(i, r) > 0)
+    }
+
+    /// What the replicates say of the error; zero where they are too few.
+    pub fn error(&self) -> TileError {
+        let mut sum = TileError::default();
+        for i in 0..(self.width * self.height) as usize {
+            for c in 0..3 {
+                let Some(s) = self.spread(i, c) else { continue };
+                sum.relative += s.relative();
+                // The estimate errs by the uncertainty of the variance; the actual squared error of
+                // this one picture scatters about its expectation by twice the variance squared.
+                let weight = 1.0 / (s.mean * s.mean + RELMSE_FLOOR);
+                sum.variance +=
+                    (s.variance_of_variance + 2.0 * s.variance.powi(2)) * weight.powi(2);
+                sum.count += 1.0;
+            }
         }
-        let (n, r) = (self.spp as f64, sums.len() as f64);
-        let mean = sums.iter().map(|s| s[c]).sum::<f64>() / n;
+        sum
+    }
+
+    /// The same of one half of the samples alone ([`super::Taken::Halves`]): the variance of its mean.
+    pub fn error_of_half(&self, half: usize) -> TileError {
+        let mut sum = TileError::default();
+        for i in 0..(self.width * self.height) as usize {
+            for c in 0..3 {
+                let s = self.spread_over(i, c, half, 2);
+                sum.relative += s.relative();
+                sum.count += 1.0;
+            }
+        }
+        sum
+    }
+
+    /// Relative standard errors of its pixels, √ of the mean over the channels of variance / (mean² + 0.01), by one
+    /// half of the samples; by both where `half` is `None`.
+    pub fn pixel_errors(&self, half: Option<usize>) -> Vec<f64> {
+        let of = |i: usize| {
+            let channel = |c: usize| {
+                let s = match half {
+                    Some(half) => Some(self.spread_over(i, c, half, 2)),
+                    None => self.spread(i, c),
+                };
+                s.map_or(0.0, |s| s.relative())
+            };
+            ((channel(0) + channel(1) + channel(2)) / 3.0).sqrt()
+        };
+        (0..(self.width * self.height) as usize).map(of).collect()
+    }
+
+    /// Of channel `c` of pixel `i`.
+    fn spread(&self, i: usize, c: usize) -> Option<Spread> {
+        if !self.has_error() {
+            return None;
+        }
+        match self.taken {
+            super::Taken::Range(_) => Some(self.spread_over(i, c, 0, 1)),
+            // The mean of two independent means.
+            super::Taken::Halves(_) => {
+                let [a, b] = [0, 1].map(|half| self.spread_over(i, c, half, 2));
+                Some(Spread {
+                    mean: 0.5 * (a.mean + b.mean),
+                    variance: 0.25 * (a.variance + b.variance),
+                    variance_of_variance: (a.variance_of_variance + b.variance_of_variance) / 16.0,
+                    covariance: 0.125 * (a.covariance + b.covariance),
+                })
+            }
+        }
+    }
+
+    /// By the replicates `first`, `first + step` and so on. A replicate of n_r of the n samples has the variance
+    /// σ²/n_r, so Σ n_r (m_r - m)² / (R - 1) estimates σ², and σ²/n is the variance of the mean.
+    fn spread_over(&self, pixel: usize, c: usize, first: usize, step: usize) -> Spread {
+        let all = self.replicates as usize;
+        let sums = &self.rgb[pixel * all..(pixel + 1) * all];
+        let numbers = || (first..all).step_by(step);
+        let n_of = |i: usize| self.taken.of_replicate(i, all) as f64;
+        let r = numbers().count() as f64;
+        let (mut n, mut sum) = (0.0, Sum::ZERO);
+        for i in numbers() {
+            n += n_of(i);
+            sum += sums[i][c];
+        }
+        let mean = sum.value() / n;
         let (mut second, mut third, mut fourth) = (0.0, 0.0, 0.0);
-        for (i, s) in sums.iter().enumerate() {
-            let n_r = self.samples_of(i) as f64;
-            let d = n_r.sqrt() * (s[c] / n_r - mean);
+        for i in numbers() {
+            let n_r = n_of(i);
+            let d = n_r.sqrt() * (sums[i][c].value() / n_r - mean);
             second += d * d;
             third += d * d * d;
             fourth += (d * d).powi(2);
@@ -133,7 +211,7 @@ impl Film {
         // lower bound of zero.
         let of_sigma2 = ((fourth / r - sigma2 * sigma2 * (r - 3.0) / (r - 1.0)) / r).max(0.0);
         // Third central moment of the mean over n, from that of the replicates scaled by sqrt(n/r).
-        let third = if sums.len() > 2 {
+        let third = if r > 2.0 {
             third * r / ((r - 1.0) * (r - 2.0))
         } else {
             0.0

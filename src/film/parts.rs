@@ -9,6 +9,16 @@ pub(super) struct Parts {
     sums: Vec<[f64; 2]>,
 }
 
+impl Parts {
+    pub(super) fn of_pixel(&self, i: usize) -> &[[f64; 2]] {
+        &self.sums[i * self.count..(i + 1) * self.count]
+    }
+
+    pub(super) fn of_pixel_mut(&mut self, i: usize) -> &mut [[f64; 2]] {
+        &mut self.sums[i * self.count..(i + 1) * self.count]
+    }
+}
+
 /// What a part of the light contributes to the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PartMoments {
@@ -41,20 +51,22 @@ impl Film {
     /// independent of the others: for quasi-random ones that is what a sample is worth alone, not what it adds
     /// beside the others.
     pub fn part_moments(&self, part: usize) -> PartMoments {
-        let n = self.spp as f64;
         let (mut mean, mut variance, mut pixels) = (0.0, 0.0, 0.0);
         for tile in &self.tiles {
+            let n = tile.taken.count() as f64;
             for sums in tile.parts.sums.chunks_exact(tile.parts.count.max(1)) {
                 let [first, second] = sums[part];
-                mean += first;
-                variance += (second - first * first / n).max(0.0);
+                mean += first / f64::max(n, 1.0);
+                if n >= 2.0 {
+                    variance += (second - first * first / n).max(0.0) / (n - 1.0);
+                }
                 pixels += 1.0;
             }
         }
         let pixels: f64 = f64::max(pixels, 1.0);
         PartMoments {
-            mean: mean / (pixels * n.max(1.0)),
-            variance: (self.spp >= 2).then(|| variance / (pixels * (n - 1.0))),
+            mean: mean / pixels,
+            variance: (self.spp() >= 2).then(|| variance / pixels),
         }
     }
 

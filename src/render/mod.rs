@@ -284,8 +284,8 @@ impl Job {
         stats.seconds = start.elapsed().as_secs_f64();
         let radius = |number: u64| transport.radius(number);
         if n > 0 {
-            stats.radius = radius(film.spp() - n)
-                .zip(radius(film.spp() - 1))
+            stats.radius = radius(film.next_sample() - n)
+                .zip(radius(film.next_sample() - 1))
                 .map(<[f32; 2]>::from);
         }
         stats
@@ -301,7 +301,7 @@ impl Job {
         splats: Option<&mut SplatBuffer>,
     ) {
         let filter = FilterSampler::new(&self.film.filter);
-        let first = film.spp();
+        let first = film.next_sample();
         let start = Instant::now();
         let mut ledger = Ledger::default();
         let iteration = transport.begin(first, &mut ledger);

@@ -26,7 +26,8 @@ pub fn add(
             if !valid {
                 let pixel = splat.film.floor().max(Vec2::ZERO).as_uvec2();
                 invalid.count += 1;
-                invalid.first = (invalid.first).or(Some((pixel.x, pixel.y, film.spp(), value)));
+                invalid.first =
+                    (invalid.first).or(Some((pixel.x, pixel.y, film.next_sample(), value)));
             }
             valid
         });
