@@ -120,8 +120,15 @@ fn warnings(surfaces: &Surfaces, report: &Report) -> Vec<String> {
         ));
     }
     let (external, emitted) = (report.external.element_sum(), report.emitted.element_sum());
+    let arriving = report.absorbed.element_sum();
     if external + emitted == 0.0 {
         warnings.push("no light arrives at any patch".to_string());
+    } else if arriving < NEGLIGIBLE * (external + emitted) && left_out.share() > 0.0 {
+        warnings.push(
+            "hardly any light arrives at patches: glass and mirrors, which radiosity leaves out, may shut it in (a path \
+             tracer finds it, with indirect=gather too)"
+                .to_string(),
+        );
     }
     warnings
 }

@@ -151,7 +151,7 @@ impl Field {
     /// What is darker than `black`, as a share of the mean, counts as that dark.
     pub fn judge_by(&mut self, tree: &Tree, black: f64) {
         /// Share of the light that counts as arriving even if links bring less: all may come through glass.
-        const LEAST: f64 = 0.01;
+        const LEAST: f64 = 0.1;
         let given = tree.emitted_power().max_element() / tree.nodes[0].area;
         let mean = self.irradiance[0].max_element();
         if mean.is_nan() || mean <= 0.0 {
