@@ -91,6 +91,11 @@ pub struct Tile {
     parts: parts::Parts,
     /// Samples that each of its pixels has received.
     taken: Taken,
+    /// And that they are to have received next, of both halves; of films whose tiles are alike, the number of the
+    /// sample before which to look again.
+    goal: [u64; 2],
+    /// Rays that its samples took.
+    cost: u64,
 }
 
 impl Tile {
@@ -105,6 +110,23 @@ impl Tile {
     /// Says that each of its pixels has received these samples too.
     pub fn take(&mut self, more: &Taken) {
         self.taken.add(more);
+    }
+
+    pub fn goal(&self) -> [u64; 2] {
+        self.goal
+    }
+
+    pub fn set_goal(&mut self, goal: [u64; 2]) {
+        self.goal = goal;
+    }
+
+    /// Rays that its samples took so far.
+    pub fn cost(&self) -> u64 {
+        self.cost
+    }
+
+    pub fn add_cost(&mut self, rays: u64) {
+        self.cost += rays;
     }
 
     fn pixel(&mut self, x: u32, y: u32) -> PixelSums<'_> {
@@ -182,6 +204,8 @@ impl Film {
                         aov: vec![Sum::ZERO; pixels * aov_channels],
                         parts: parts::Parts::default(),
                         taken: taken.clone(),
+                        goal: [0; 2],
+                        cost: 0,
                     }
                 })
             })
@@ -236,6 +260,16 @@ impl Film {
     /// Number of the sample that is next; 0 where tiles differ.
     pub fn next_sample(&self) -> u64 {
         self.range().map_or(0, |range| range.end)
+    }
+
+    /// Number of the sample before which to look whether the picture is good enough, where tiles are alike.
+    pub fn goal(&self) -> u64 {
+        self.tiles.first().map_or(0, |tile| tile.goal[0])
+    }
+
+    /// Tiles that lie beside each other come one after the other, row by row; so many are in a row.
+    pub fn tiles_across(&self) -> usize {
+        self.window.width.div_ceil(TILE) as usize
     }
 
     /// The tiles, row by row.

@@ -7,7 +7,7 @@ use std::fmt;
 ///
 /// A sum is four planes, the low and high 32 bits of its two numbers (see [`Sum`]): `sum{r}{c}{i}` for channel c of
 /// replicate r, `aov{c}_{i}`; `part{p}_{i}` are the two moments of a part, of two planes each; `taken_{i}` the number of
-/// samples of both halves where tiles differ.
+/// samples of both halves, those that are wanted next, and rays, where tiles differ.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Planes(pub Vec<(String, Vec<u32>)>);
 
@@ -42,10 +42,10 @@ fn numbers(tile: &Tile, i: usize, mut put: impl FnMut(u32)) {
         put(bits as u32);
         put((bits >> 32) as u32);
     }
-    if let Taken::Halves(halves) = &tile.taken {
-        for n in halves {
-            put(*n as u32);
-            put((*n >> 32) as u32);
+    if let Taken::Halves([even, odd]) = tile.taken {
+        for n in [even, odd, tile.goal[0], tile.goal[1], tile.cost] {
+            put(n as u32);
+            put((n >> 32) as u32);
         }
     }
 }
@@ -65,7 +65,7 @@ impl Film {
             names.extend((0..4).map(|i| format!("part{p}_{i}")));
         }
         if self.range().is_none() {
-            names.extend((0..4).map(|i| format!("taken_{i}")));
+            names.extend((0..10).map(|i| format!("taken_{i}")));
         }
         names
     }
@@ -111,7 +111,7 @@ impl Film {
         let differ = self.range().is_none();
         for tile in &mut self.tiles {
             let (r, a) = (tile.replicates as usize, tile.aov_channels);
-            let mut halves = [0; 2];
+            let mut numbers = [0; 5];
             for i in 0..(tile.width * tile.height) as usize {
                 let at = tile.at(i, width);
                 let mut next = found.iter().map(|plane| plane[at]);
@@ -124,11 +124,15 @@ impl Film {
                     *moment += f64::from_bits(u64::from(word()) | u64::from(word()) << 32);
                 }
                 if differ {
-                    halves = [(); 2].map(|_| u64::from(word()) | u64::from(word()) << 32);
+                    numbers = [(); 5].map(|_| u64::from(word()) | u64::from(word()) << 32);
                 }
             }
             match differ {
-                true => tile.take(&Taken::Halves(halves)),
+                true => {
+                    let [even, odd, a, b, cost] = numbers;
+                    tile.take(&Taken::Halves([even, odd]));
+                    (tile.goal, tile.cost) = ([a, b], cost);
+                }
                 false => tile.take(taken),
             }
         }

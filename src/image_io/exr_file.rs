@@ -230,7 +230,7 @@ fn part(
     };
     attributes.layer_name = name.map(text).transpose()?;
     // Noise in 32-bit floats does not compress; the rest does.
-    let float = |c: &Channel| matches!(c.samples, Samples::Float(_));
+    let float = |c: &Channel| matches!(c.samples, Samples::Float(_) | Samples::Bits(_));
     let compression = match layer.channels.iter().any(float) {
         true => Compression::Uncompressed,
         false => Compression::ZIP16,
@@ -245,7 +245,7 @@ fn part(
         let samples = match &channel.samples {
             Samples::Half(v) => FlatSamples::F16(v.iter().map(|&x| f16::from_f32(x)).collect()),
             Samples::Float(v) => FlatSamples::F32(v.clone()),
-            Samples::Uint(v) => FlatSamples::U32(v.clone()),
+            Samples::Uint(v) | Samples::Bits(v) => FlatSamples::U32(v.clone()),
         };
         channels.push(AnyChannel::new(text(&channel.name)?, samples));
     }

@@ -77,13 +77,15 @@ pub enum Samples {
     Float(Vec<f32>),
     /// Counts and identifiers, exact over the whole range.
     Uint(Vec<u32>),
+    /// The same, of bits that look like noise: not compressed. Read as [`Samples::Uint`].
+    Bits(Vec<u32>),
 }
 
 impl Samples {
     pub fn len(&self) -> usize {
         match self {
             Samples::Half(v) | Samples::Float(v) => v.len(),
-            Samples::Uint(v) => v.len(),
+            Samples::Uint(v) | Samples::Bits(v) => v.len(),
         }
     }
 
@@ -96,7 +98,7 @@ impl Samples {
     pub fn get(&self, i: usize) -> f32 {
         match self {
             Samples::Half(v) | Samples::Float(v) => v.get(i).copied().unwrap_or(f32::NAN),
-            Samples::Uint(v) => v.get(i).map_or(f32::NAN, |&n| n as f32),
+            Samples::Uint(v) | Samples::Bits(v) => v.get(i).map_or(f32::NAN, |&n| n as f32),
         }
     }
 }

@@ -18,7 +18,7 @@ use std::iter::Sum;
 use std::ops::{Add, AddAssign, Div, Index, IndexMut, Mul, MulAssign, Neg, Sub, SubAssign};
 
 /// A linear colour (Rec. 709 primaries, D65 white): radiance, reflectance, or any per-channel number.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Rgb {
     pub r: f32,
     pub g: f32,

@@ -1,22 +1,23 @@
 //! From the film to a picture with layers and metadata.
 
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::{Job, Stats};
+use super::{AovLayer, Job, Stats};
 use crate::film::{Film, student_t_95};
 use crate::image_io::{Channel, Image, Layer, Samples};
 use crate::math::Rgb;
 use crate::transport::aov::Aov;
 
 /// How the colour channels of the file are stored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ComponentFormat {
     Float16,
     Float32,
 }
 
 /// Which channels the picture has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum PixelFormat {
     Luminance,
     LuminanceAlpha,
@@ -36,7 +37,7 @@ impl PixelFormat {
 }
 
 /// What the file says about the making of the picture, beyond what job, film and statistics know.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Metadata {
     /// File name of the scene.
     pub scene: String,
@@ -45,14 +46,48 @@ pub struct Metadata {
     pub command_line: String,
 }
 
+/// What of a job a picture tells: enough to make one of a film where the scene is not at hand.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Recipe {
+    /// Width and height of the full picture.
+    pub frame: [u32; 2],
+    pub aovs: Vec<AovLayer>,
+    pub pixel_format: PixelFormat,
+    pub component_format: ComponentFormat,
+    pub integrator: String,
+    pub biased: bool,
+    pub sampler: String,
+    pub seed: u64,
+}
+
 impl Job {
+    pub fn recipe(&self) -> Recipe {
+        Recipe {
+            frame: [self.film.width, self.film.height],
+            aovs: self.aovs.clone(),
+            pixel_format: self.pixel_format,
+            component_format: self.component_format,
+            integrator: self.integrator.name().to_string(),
+            biased: self.integrator.biased(),
+            sampler: self.sampler.name().to_string(),
+            seed: self.seed,
+        }
+    }
+
+    /// As [`Recipe::picture`].
+    pub fn picture(&self, film: &Film, stats: &Stats, metadata: &Metadata) -> Image {
+        self.recipe().picture(film, stats, metadata)
+    }
+}
+
+impl Recipe {
     /// The picture: the colours, their standard error (`stderr`), the number of samples (`spp`) and a
     /// layer for each arbitrary output variable.
     pub fn picture(&self, film: &Film, stats: &Stats, metadata: &Metadata) -> Image {
         let window = film.window();
         let mut image = Image::new(window.width as usize, window.height as usize);
         image.offset = [window.x as i32, window.y as i32];
-        image.frame = [self.film.width as usize, self.film.height as usize];
+        image.frame = self.frame.map(|n| n as usize);
         let store = match self.component_format {
             ComponentFormat::Float16 => Samples::Half,
             ComponentFormat::Float32 => Samples::Float,
@@ -66,11 +101,11 @@ impl Job {
                 .layers
                 .push(Layer::from_rgb("stderr", &stderr, Samples::Float));
         }
-        let spp = u32::try_from(film.spp()).unwrap_or(u32::MAX);
-        image.layers.push(Layer::from_scalar(
-            "spp",
-            Samples::Uint(vec![spp; mean.len()]),
-        ));
+        let spp = |n: u64| u32::try_from(n).unwrap_or(u32::MAX);
+        let counts = film.counts().into_iter().map(spp).collect();
+        image
+            .layers
+            .push(Layer::from_scalar("spp", Samples::Uint(counts)));
         let mut first = 0;
         for layer in &self.aovs {
             let names = layer.aov.channels();
@@ -139,15 +174,15 @@ impl Job {
             "scene": metadata.scene,
             "scene_hash": metadata.scene_hash,
             "command_line": metadata.command_line,
-            "integrator": self.integrator.name(),
-            "biased": if self.integrator.biased() { "yes" } else { "no" },
+            "integrator": self.integrator,
+            "biased": if self.biased { "yes" } else { "no" },
             "bias": stats.radius.map(|[first, last]| json!({
                 "of": "light gathered from disks: detail smaller than them is blurred",
                 "parameter": "radius",
                 "first": first,
                 "last": last,
             })),
-            "sampler": self.sampler.name(),
+            "sampler": self.sampler,
             "spp": film.spp(),
             "seed": self.seed,
             "replicates": film.replicates(),
@@ -155,7 +190,7 @@ impl Job {
             "invalid_samples": stats.invalid.count,
             "estimated_error": error.map(|e| json!({ "relmse": e.relmse, "ci95": e.ci95 })),
             // Half-width of a pixel's 95 % confidence interval, in units of the layer `stderr`.
-            "ci95_in_stderr": film.has_error().then(|| student_t_95(film.replicates() - 1)),
+            "ci95_in_stderr": film.has_error().then(|| student_t_95(film.freedom())),
         })
     }
 }

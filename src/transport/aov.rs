@@ -6,7 +6,7 @@ use crate::scene::Scene;
 use crate::transport::Li;
 
 /// A quantity of the first surface seen. Where nothing is seen it is zero.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Aov {
     /// Reflectance of the surface, as a colour.
     Albedo,

@@ -9,7 +9,7 @@ use crate::film::Splat;
 use crate::math::Rgb;
 
 /// Rays traced, by purpose.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct PathStats {
     pub camera: u64,
     pub shadow: u64,

@@ -42,7 +42,7 @@ use crate::transport::{Ledger, Li, PathStats, Setting, VertexNumbers};
 ///
 /// At a random share of the vertices where the cache is read, light is also found by walking on, as without a cache.
 /// The difference, as it counts in the picture, has the bias as its mean.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Bias {
     pub reads: u64,
     /// Those of them that were compared.
