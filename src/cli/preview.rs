@@ -22,8 +22,9 @@ const SHARE: u32 = 20;
 const CONNECT: Duration = Duration::from_secs(3);
 /// How long the viewer may take for what is left when the rendering is done.
 const LAST: Duration = Duration::from_secs(5);
-/// Pixels of one packet, but for a single row that has more: its length has 32 bits, and it is copied once.
-const PACKET_PIXELS: usize = 1 << 22;
+/// Pixels of one packet, but for a single row that has more: a packet tells its length in 32 bits, and is copied
+/// before it is sent.
+const PACKET_PIXELS: usize = 1 << 20;
 
 const CHANNELS: [&str; 3] = ["R", "G", "B"];
 
@@ -234,7 +235,7 @@ fn update(client: &mut TevClient, name: &str, window: Window, picture: &[f32]) -
     let row = CHANNELS.len() * window.width as usize;
     let rows = (PACKET_PIXELS / (window.width as usize).max(1)).max(1);
     let mut y = 0;
-    for data in picture.chunks(rows * row) {
+    for data in picture.chunks((rows * row).max(1)) {
         let height = (data.len() / row) as u32;
         client.send(PacketUpdateImage {
             image_name: name,
