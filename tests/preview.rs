@@ -256,7 +256,7 @@ fn a_viewer_that_does_not_read_is_not_waited_for_long() {
     let (port, viewer) = viewer(|stream| stream);
     let start = Instant::now();
     let output = folder.render(&format!(
-        "--resolution 1800x1200 --spp 2 -o a.pfm --preview 127.0.0.1:{port}"
+        "--resolution 1300x1000 --spp 1 -o a.pfm --preview 127.0.0.1:{port}"
     ));
     let took = start.elapsed();
     drop(viewer.join().unwrap());
