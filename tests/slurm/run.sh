@@ -198,7 +198,6 @@ install_slurm
 build_luxel
 cd "$work"
 cp "$project/scenes/cornell-balls.xml" built-in.xml
-cp -r "$project/scenes/fragments" "$project/scenes/meshes" "$project/scenes/textures" . 2>/dev/null || true
 
 say "the job script"
 job_script
@@ -214,7 +213,7 @@ kill_renderer "$shards"
 
 wait_for "$patience" no_jobs || { squeue; fail "the jobs do not end within $patience s"; }
 say "logs of the tasks"
-tail -n 3 slurm-*.out merge.log
+tail -n 3 slurm-*.out merge.log || true
 for task in $(seq "$shards"); do
     tries=$(restarts "${array}_$task")
     echo "task $task: $tries"
