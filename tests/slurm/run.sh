@@ -7,13 +7,14 @@
 #
 # Needs Debian or Ubuntu, and root where Slurm is not installed yet; takes a few minutes. Everything runs as the
 # present user from a temporary folder, with ports and a munge key of its own, so that a Slurm of the system is not
-# touched, and all daemons end with the script. KEEP=1 keeps the folder. LUXEL=PROGRAM takes that program in place of
+# touched, and all daemons end with the script. KEEP=1 keeps the folder. SPP=N renders N samples per pixel,
+# 64 by default: where the tasks are too short to be killed, take more. LUXEL=PROGRAM takes that program in place of
 # the one that is built here. Not part of `cargo test`.
 set -euo pipefail
 
 project=$(cd "$(dirname "$0")/../.." && pwd)
 shards=4
-spp=${SPP:-192}
+spp=${SPP:-64}
 patience=600 # seconds for all jobs
 
 say() { echo "== $*"; }
