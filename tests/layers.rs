@@ -19,7 +19,7 @@ const ROWS: [&[&str]; 10] = [
 
 /// Crates that only the named rooms may use. Threads (rayon) are for what loops over pixels, shapes or
 /// triangles, not for what happens at one hit.
-const CRATES: [(&str, &[&str]); 15] = [
+const CRATES: [(&str, &[&str]); 16] = [
     ("obvhs", &["geom"]),
     (
         "rayon",
@@ -46,6 +46,7 @@ const CRATES: [(&str, &[&str]); 15] = [
     ("clap", &["cli"]),
     ("indicatif", &["cli"]),
     ("ctrlc", &["cli"]),
+    ("tev_client", &["cli"]),
 ];
 
 /// Unit tests in files of their own are left out: they may use what helps testing.

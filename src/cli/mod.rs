@@ -4,6 +4,7 @@
 pub mod compare;
 mod info;
 mod numbers;
+mod preview;
 mod progress;
 mod radiosity;
 mod render;

@@ -61,6 +61,15 @@ impl Progress {
         }
     }
 
+    /// Prints a warning, above the bar if there is one.
+    pub fn warn(&self, warning: &str) {
+        let print = || eprintln!("warning: {warning}");
+        match self {
+            Progress::Bar(bar) => bar.suspend(print),
+            _ => print(),
+        }
+    }
+
     pub fn finish(&self) {
         if let Progress::Bar(bar) = self {
             bar.finish_and_clear();

@@ -11,6 +11,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde_json::json;
 
 use super::numbers::whole;
+use super::preview::{self, Viewer};
 use super::progress::{Progress, ProgressMode, human_seconds};
 use super::{Failure, Outcome};
 use crate::film::{Film, Window};
@@ -63,6 +64,9 @@ pub struct RenderArgs {
     /// Layers to add to the EXR: albedo, normal, depth, position, uv, shape_id
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     pub aov: Vec<String>,
+    /// Show the picture while it is rendered, in the viewer tev that listens there (by itself on 127.0.0.1:14158)
+    #[arg(long, value_name = "HOST:PORT", value_parser = preview::parse_address)]
+    pub preview: Option<String>,
     /// How to show progress
     #[arg(long, value_enum, default_value_t = ProgressMode::Auto)]
     pub progress: ProgressMode,
@@ -136,6 +140,8 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
         );
         return Err(Failure::Usage(what));
     }
+    // Who asked for a viewer wants to know before all else that it is not there.
+    let viewer = args.preview.as_deref().map(Viewer::connect).transpose()?;
     let start = Instant::now();
     let desc = match &args.scene {
         Some(path) => format::load(path, &args.define)?,
@@ -168,10 +174,15 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
         (None, None) => Stop::Spp(compiled.spp),
     };
     let job = &compiled.job;
+    let name = scene_name(args.scene.as_deref());
+    let preview = viewer.map(|v| v.open(&name, job.film.crop));
+    let mut preview = preview.transpose()?;
     let mut progress = Progress::new(args.progress);
     let rendered = pool.install(|| {
         job.render(stop, |film, stats| {
             progress.update(film, stats, stop);
+            let warning = preview.as_mut().and_then(|p| p.update(film));
+            warning.iter().for_each(|w| progress.warn(w));
             match stopped.load(Ordering::Relaxed) {
                 true => ControlFlow::Break(()),
                 false => ControlFlow::Continue(()),
@@ -186,7 +197,7 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
 
     let write_start = Instant::now();
     let metadata = Metadata {
-        scene: scene_name(args.scene.as_deref()),
+        scene: name,
         scene_hash: compiled.hash.clone(),
         command_line: command_line.to_string(),
     };
@@ -204,6 +215,9 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
         );
         image_io::write_atomic(path, text.as_bytes())?;
     }
+    // Only now that all is written: the viewer may keep it waiting.
+    let warning = preview.and_then(|p| p.finish(&film));
+    warning.iter().for_each(|w| progress.warn(w));
     warn_of_bias(cache_bias(&film, &stats));
     eprintln!("{}", summary(&film, &stats, &outputs));
     report_invalid(&stats);
