@@ -3,11 +3,14 @@
 
 pub mod compare;
 mod info;
+mod merge;
 mod numbers;
 mod preview;
 mod progress;
 mod radiosity;
 mod render;
+mod resume;
+mod told;
 
 use std::ffi::OsString;
 use std::fmt;
@@ -38,6 +41,8 @@ enum Command {
     /// Render a scene to an image, with an estimate of its error
     Render(Box<render::RenderArgs>),
     Compare(Box<compare::CompareArgs>),
+    /// Join the shards of a picture that `render --shard` made
+    Merge(merge::MergeArgs),
     /// Solve for the radiosity of a scene, and write it as a mesh with colours
     Radiosity(Box<radiosity::RadiosityArgs>),
     /// Show what a scene contains and what is modelled for it, or what is supported at all
@@ -145,6 +150,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let result = match &cli.command {
         Command::Render(args) => render::run(args, &line),
         Command::Compare(args) => compare::run(args),
+        Command::Merge(args) => merge::run(args, &line),
         Command::Radiosity(args) => radiosity::run(args, &line),
         Command::Info(args) => info::run(args),
         Command::Completions { shell } => {

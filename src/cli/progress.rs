@@ -82,6 +82,17 @@ fn done(film: &Film, stats: &Stats, stop: Stop) -> f64 {
     match stop {
         Stop::Spp(n) => film.spp() as f64 / n.max(1) as f64,
         Stop::Time(limit) => (stats.seconds / limit.as_secs_f64().max(1e-9)).min(1.0),
+        // Squared errors fall as samples rise.
+        Stop::Error { target, within } => {
+            let good = film
+                .estimate_error()
+                .map_or(0.0, |e| match target.quantile {
+                    None if e.relmse > 0.0 => (target.error.powi(2) / e.relmse).min(1.0),
+                    _ => 0.0,
+                });
+            let late = within.map_or(0.0, |limit| stats.seconds / limit.as_secs_f64().max(1e-9));
+            good.max(late).min(1.0)
+        }
     }
 }
 

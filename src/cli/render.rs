@@ -8,16 +8,17 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use serde_json::json;
 
 use super::numbers::whole;
 use super::preview::{self, Viewer};
-use super::progress::{Progress, ProgressMode, human_seconds};
+use super::progress::{Progress, ProgressMode};
+use super::resume::{Checkpoints, Interval, parse_interval};
+use super::told::{self, Seconds};
 use super::{Failure, Outcome};
-use crate::film::{Film, Window};
+use crate::film::Window;
 use crate::format::{self, Overrides};
 use crate::image_io::{self, Image};
-use crate::render::{Job, Metadata, Stats, Stop, TechniqueStats, percent};
+use crate::render::{Identity, Metadata, Shard, Stats, Stop, Target, Work};
 
 #[derive(Args, Debug)]
 pub struct RenderArgs {
@@ -40,6 +41,10 @@ pub struct RenderArgs {
     /// Samples per pixel [default: what the scene's sampler says, else 4]
     #[arg(long, value_name = "N", conflicts_with = "time", allow_negative_numbers = true, value_parser = whole(1..=u64::MAX))]
     pub spp: Option<u64>,
+    /// Render until the error is no more than this: 1% (relative root mean square error of the picture), or 2%@p95
+    /// (that of 95 % of the pixels); samples go where the error is. With --time, no longer than that
+    #[arg(long, value_name = "ERROR", conflicts_with = "spp", value_parser = parse_target)]
+    pub target_error: Option<Target>,
     /// Render for this long: 500ms, 90s, 5m, 1h; at least one sample per pixel is taken
     #[arg(long, value_name = "TIME", allow_negative_numbers = true, value_parser = parse_duration)]
     pub time: Option<Duration>,
@@ -67,6 +72,15 @@ pub struct RenderArgs {
     /// Show the picture while it is rendered, in the viewer tev that listens there (by itself on 127.0.0.1:14158)
     #[arg(long, value_name = "HOST:PORT", value_parser = preview::parse_address)]
     pub preview: Option<String>,
+    /// Go on from the checkpoint beside the first output; without one, from the start
+    #[arg(long)]
+    pub resume: bool,
+    /// How often to write a checkpoint beside the first output, as NAME.checkpoint.exr: 60s, 10m, never
+    #[arg(long, value_name = "TIME", default_value = "60s", value_parser = parse_interval)]
+    pub checkpoint: Interval,
+    /// Render only part I of N of the samples, to be joined by `luxel merge`: every output must be an EXR file
+    #[arg(long, value_name = "I/N", value_parser = parse_shard, conflicts_with_all = ["time", "target_error"])]
+    pub shard: Option<Shard>,
     /// How to show progress
     #[arg(long, value_enum, default_value_t = ProgressMode::Auto)]
     pub progress: ProgressMode,
@@ -75,7 +89,7 @@ pub struct RenderArgs {
     pub stats: Option<PathBuf>,
 }
 
-fn parse_duration(text: &str) -> Result<Duration, String> {
+pub(super) fn parse_duration(text: &str) -> Result<Duration, String> {
     let split = text
         .find(|c: char| c.is_ascii_alphabetic())
         .unwrap_or(text.len());
@@ -95,6 +109,52 @@ fn parse_duration(text: &str) -> Result<Duration, String> {
         .ok()
         .filter(|d| !d.is_zero())
         .ok_or_else(|| "expected a time above zero".to_string())
+}
+
+/// `1%`, `0.01`, `2%@p95`.
+fn parse_target(text: &str) -> Result<Target, String> {
+    let expected = "expected an error such as 1% or 2%@p95";
+    let (error, quantile) = match text.split_once('@') {
+        None => (text, None),
+        Some((error, quantile)) => (error, Some(quantile)),
+    };
+    let number = |text: &str| {
+        text.trim()
+            .parse::<f64>()
+            .ok()
+            .filter(|x| *x > 0.0 && x.is_finite())
+    };
+    let error = match error.trim().strip_suffix('%') {
+        Some(percent) => number(percent).map(|p| p / 100.0),
+        None => number(error),
+    };
+    let quantile = match quantile {
+        None => None,
+        Some(text) => {
+            let percent = text.trim().strip_prefix('p').and_then(number);
+            let share = percent.map(|p| p / 100.0).filter(|share| *share < 1.0);
+            Some(share.ok_or(expected)?)
+        }
+    };
+    Ok(Target {
+        error: error.ok_or(expected)?,
+        quantile,
+    })
+}
+
+/// `2/8`.
+fn parse_shard(text: &str) -> Result<Shard, String> {
+    /// More shards than samples make no sense.
+    const MOST: u64 = 1 << 32;
+    let numbers = text
+        .split_once('/')
+        .map(|(i, n)| (i.trim().parse(), n.trim().parse()));
+    match numbers {
+        Some((Ok(number), Ok(of))) if number >= 1 && number <= of && of <= MOST => {
+            Ok(Shard { number, of })
+        }
+        _ => Err("expected I/N with I from 1 to N, such as 2/8".to_string()),
+    }
 }
 
 fn parse_numbers<const N: usize>(
@@ -165,22 +225,54 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
     }
     // Better before a long rendering than after it.
     outputs.iter().try_for_each(Image::check_target)?;
+    let is_exr = |path: &&PathBuf| {
+        path.extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("exr"))
+    };
+    if args.shard.is_some()
+        && let Some(other) = outputs.iter().find(|path| !is_exr(path))
+    {
+        let what = format!(
+            "-o {}: a shard is an EXR file: use -o NAME.exr",
+            other.display()
+        );
+        return Err(Failure::Usage(what));
+    }
     args.stats
         .iter()
         .try_for_each(|path| image_io::check_writable(path))?;
-    let stop = match (args.spp, args.time) {
-        (Some(n), _) => Stop::Spp(n),
-        (None, Some(time)) => Stop::Time(time),
-        (None, None) => Stop::Spp(compiled.spp),
-    };
     let job = &compiled.job;
+    let work = Work {
+        stop: match (args.target_error, args.spp, args.time) {
+            (Some(target), _, within) => Stop::Error { target, within },
+            (None, Some(n), _) => Stop::Spp(n),
+            (None, None, Some(time)) => Stop::Time(time),
+            (None, None, None) => Stop::Spp(compiled.spp),
+        },
+        shard: args.shard,
+    };
+    let stop = work.stop;
     let name = scene_name(args.scene.as_deref());
     let preview = viewer.map(|v| v.open(&name, job.film.crop));
     let mut preview = preview.transpose()?;
+    let metadata = Metadata {
+        scene: name,
+        scene_hash: compiled.hash.clone(),
+        command_line: command_line.to_string(),
+    };
+    let identity = Identity::new(job, stop, &desc.fingerprint());
+    let mut checkpoints =
+        Checkpoints::new(&outputs[0], args.checkpoint.0, (job, &identity, &metadata));
+    let (film, stats) = match args.resume {
+        true => checkpoints.resume(&work)?,
+        false => (job.film_for(&work), Stats::default()),
+    };
     let mut progress = Progress::new(args.progress);
     let rendered = pool.install(|| {
-        job.render(stop, |film, stats| {
+        job.go_on(&work, film, stats, |film, stats| {
             progress.update(film, stats, stop);
+            let warning = checkpoints.update(&work, film, stats);
+            warning.iter().for_each(|w| progress.warn(w));
             let warning = preview.as_mut().and_then(|p| p.update(film));
             warning.iter().for_each(|w| progress.warn(w));
             match stopped.load(Ordering::Relaxed) {
@@ -196,13 +288,25 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
     let threads = pool.current_num_threads();
 
     let write_start = Instant::now();
-    let metadata = Metadata {
-        scene: name,
-        scene_hash: compiled.hash.clone(),
-        command_line: command_line.to_string(),
+    let interrupted = stopped.load(Ordering::Relaxed);
+    if interrupted {
+        checkpoints.write(&work, &film, &stats)?;
+    }
+    let image = match work.shard {
+        None => job.picture(&film, &stats, &metadata),
+        Some(_) => job.to_be_saved(&identity, &work, &film, &stats, &metadata),
     };
-    let image = job.picture(&film, &stats, &metadata);
-    write_all(&image, &outputs)?;
+    if let Err(failure) = told::write_all(&image, &outputs) {
+        // What took long must not be lost to a bad path.
+        let kept = checkpoints.write(&work, &film, &stats);
+        return Err(match kept {
+            Ok(path) => Failure::Output(format!(
+                "{failure}; what was rendered is kept in {}: go on by --resume",
+                path.display()
+            )),
+            Err(_) => failure,
+        });
+    }
     let seconds = Seconds {
         load,
         build,
@@ -211,27 +315,30 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
     if let Some(path) = &args.stats {
         let text = format!(
             "{:#}\n",
-            statistics(job, &film, &stats, &metadata, &seconds, threads)
+            told::statistics(job, &film, &stats, &metadata, &seconds, threads)
         );
         image_io::write_atomic(path, text.as_bytes())?;
     }
     // Only now that all is written: the viewer may keep it waiting.
     let warning = preview.and_then(|p| p.finish(&film));
     warning.iter().for_each(|w| progress.warn(w));
-    warn_of_bias(cache_bias(&film, &stats));
-    eprintln!("{}", summary(&film, &stats, &outputs));
-    report_invalid(&stats);
-    Ok(if stopped.load(Ordering::Relaxed) {
-        Outcome::Interrupted
-    } else {
-        Outcome::Done
+    told::warn_of_bias(told::cache_bias(&film, &stats));
+    told::warn_of_target(job, stop, &film);
+    eprintln!("{}", told::summary(&film, &stats, &outputs));
+    told::report_invalid(&stats);
+    Ok(match interrupted {
+        true => Outcome::Interrupted,
+        false => {
+            // A picture that ran out of time may be gone on with.
+            match args.target_error {
+                Some(target) if !job.is_good_enough(&film, &target) => {
+                    checkpoints.write(&work, &film, &stats)?;
+                }
+                _ => checkpoints.remove(),
+            }
+            Outcome::Done
+        }
     })
-}
-
-struct Seconds {
-    load: Duration,
-    build: Duration,
-    write: Duration,
 }
 
 /// First Ctrl-C: finish the pass, or whatever the `work` is made of, and write. Second: end at once.
@@ -275,178 +382,4 @@ fn outputs(args: &RenderArgs) -> Vec<PathBuf> {
         .iter()
         .map(|e| PathBuf::from(format!("{name}.{e}")))
         .collect()
-}
-
-/// Writes to every output even if one fails: what took long to render must not be lost to one bad path.
-fn write_all(image: &Image, outputs: &[PathBuf]) -> Result<(), Failure> {
-    let results: Vec<_> = outputs.iter().map(|path| image.write(path)).collect();
-    results
-        .into_iter()
-        .collect::<Result<(), _>>()
-        .map_err(Failure::from)
-}
-
-/// Bias that reading radiosity gave to the mean of the picture, and its standard error, relative to that mean.
-fn cache_bias(film: &Film, stats: &Stats) -> Option<[f64; 2]> {
-    let window = film.window();
-    let pixels = u64::from(window.width) * u64::from(window.height);
-    let luminance = |[r, g, b]: &[f64; 3]| 0.2126 * r + 0.7152 * g + 0.0722 * b;
-    let mean = film.mean().iter().map(luminance).sum::<f64>() / pixels as f64;
-    let bias = stats.bias.mean(pixels * film.spp())?;
-    (mean > 0.0).then(|| bias.map(|b| b / mean))
-}
-
-/// Bias, as a share of the picture's mean, and standard errors of it, from which on it is worth a warning.
-const MUCH_BIAS: [f64; 2] = [0.05, 4.0];
-
-/// Says so where reading radiosity made the picture much brighter or darker.
-fn warn_of_bias(bias: Option<[f64; 2]>) {
-    let [much, sure] = MUCH_BIAS;
-    if let Some([mean, stderr]) = bias
-        && mean.abs() > much.max(sure * stderr)
-    {
-        eprintln!(
-            "warning: the picture is too {} by {:.0} % in the mean, since radiosity is too coarse: give it more walks, or \
-             use --indirect guide or none",
-            if mean > 0.0 { "bright" } else { "dark" },
-            100.0 * mean.abs()
-        );
-    }
-}
-
-/// One line: what was done, how fast, and how large the error is.
-fn summary(film: &Film, stats: &Stats, outputs: &[PathBuf]) -> String {
-    let error = match film.estimate_error() {
-        Some(e) => {
-            let [value, low, high] = percent(&e);
-            format!(
-                "estimated relMSE {:.3e} (95 %: {:.3e} to {:.3e}), a relative error of {value:.2} % ({low:.2} % to {high:.2} %) per pixel",
-                e.relmse, e.ci95[0], e.ci95[1]
-            )
-        }
-        None => format!(
-            "{} samples per pixel give no estimate of the error",
-            film.spp()
-        ),
-    };
-    let bias = match cache_bias(film, stats) {
-        Some([mean, stderr]) => format!(
-            "; bias by radiosity {:+.2} % (standard error {:.2} %) of the picture's mean",
-            100.0 * mean,
-            100.0 * stderr
-        ),
-        None => String::new(),
-    };
-    let files = outputs
-        .iter()
-        .map(|p| p.display().to_string())
-        .collect::<Vec<_>>()
-        .join(", ");
-    format!(
-        "{} samples per pixel in {}, {:.2} Mrays/s; {error}{bias}; wrote {files}",
-        film.spp(),
-        human_seconds(stats.seconds),
-        stats.rays_per_second() / 1e6
-    )
-}
-
-fn report_invalid(stats: &Stats) {
-    if let Some((x, y, sample, value)) = stats.invalid.first {
-        eprintln!(
-            "warning: {} samples were NaN, infinite or negative and are left out: a fault of luxel, please report it; \
-             the first: pixel ({x}, {y}), sample {sample}, value {:?}",
-            stats.invalid.count,
-            value.to_array()
-        );
-    }
-}
-
-/// The file that `--stats` writes.
-fn statistics(
-    job: &Job,
-    film: &Film,
-    stats: &Stats,
-    metadata: &Metadata,
-    seconds: &Seconds,
-    threads: usize,
-) -> serde_json::Value {
-    let plan = job.scene.plan().entries.iter();
-    let plan: Vec<_> = plan
-        .map(|e| json!({ "subject": e.subject, "decision": e.decision, "reason": e.reason }))
-        .collect();
-    let phases = &stats.phases;
-    let mut clock = json!({
-        "load": seconds.load.as_secs_f64(),
-        "build": seconds.build.as_secs_f64(),
-        "precompute": phases.precompute(),
-        "render": stats.seconds - phases.precompute(),
-        "write": seconds.write.as_secs_f64(),
-    });
-    let techniques = job.technique_stats(film, stats);
-    if !techniques.is_empty() {
-        clock["photons"] = json!(phases.photons);
-        clock["map"] = json!(phases.map);
-        clock["camera"] = json!(phases.samples);
-        clock["splats"] = json!(phases.splats);
-    }
-    if let Some(report) = &stats.solution {
-        clock["radiosity"] = json!(phases.radiosity);
-        clock["radiosity_mesh"] = json!(report.mesh_seconds);
-        clock["radiosity_form_factors"] = json!(report.form_factor_seconds);
-        clock["radiosity_solve"] = json!(report.solve_seconds);
-    }
-    let describe = |t: &TechniqueStats| {
-        json!({
-            "name": t.name,
-            "energy_share": t.energy_share,
-            "variance": t.variance,
-            "rays": t.rays,
-        })
-    };
-    let techniques: Vec<_> = techniques.iter().map(describe).collect();
-    json!({
-        "version": env!("CARGO_PKG_VERSION"),
-        "scene": metadata.scene,
-        "integrator": job.integrator.name(),
-        "resolution": [film.window().width, film.window().height],
-        "spp": film.spp(),
-        "seed": job.seed,
-        "threads": threads,
-        "seconds": clock,
-        "rays": {
-            "camera": stats.rays.camera,
-            "shadow": stats.rays.shadow,
-            "indirect": stats.rays.indirect,
-            "photon": stats.rays.photon,
-        },
-        "rays_per_second": stats.rays_per_second(),
-        "peak_memory_bytes": peak_memory(),
-        "estimated_error": film.estimate_error().map(|e| json!({ "relmse": e.relmse, "ci95": e.ci95 })),
-        "invalid_samples": stats.invalid.count,
-        "techniques": techniques,
-        "radiosity": stats.solution.as_ref().map(|r| json!({
-            "patches": r.patches,
-            "links": r.links,
-            "steps": r.steps,
-            "residual": r.residual,
-            "converged": r.converged,
-            "other": r.other,
-        })),
-        "bias": cache_bias(film, stats).map(|[mean, stderr]| json!({
-            "of": "light between diffuse surfaces read from radiosity, relative to the picture's mean",
-            "mean": mean,
-            "stderr": stderr,
-            "reads": stats.bias.reads,
-            "compared": stats.bias.compared,
-        })),
-        "plan": plan,
-    })
-}
-
-/// Most memory the program has held, in bytes, where the system tells it (Linux).
-pub(super) fn peak_memory() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
-    let kib: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some(kib * 1024)
 }

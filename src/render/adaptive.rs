@@ -39,13 +39,19 @@ pub fn round_is_done(film: &Film) -> bool {
     }
 }
 
+pub fn is_good_enough(film: &Film, target: &Target) -> bool {
+    film.has_error() && excess(film, target).is_none()
+}
+
 /// Plans another round; false where the picture is good enough.
 pub fn plan_round(film: &mut Film, target: &Target) -> bool {
     let first = FIRST.div_ceil(u64::from(film.replicates())) * u64::from(film.replicates());
     let is_uniform = film.range().is_some();
     if film.samples() == 0 {
         let goal = if is_uniform { first } else { first / 2 };
-        film.tiles_mut().iter_mut().for_each(|tile| tile.set_goal([goal; 2]));
+        film.tiles_mut()
+            .iter_mut()
+            .for_each(|tile| tile.set_goal([goal; 2]));
         return true;
     }
     let Some(ratio) = excess(film, target) else {
@@ -57,7 +63,9 @@ pub fn plan_round(film: &mut Film, target: &Target) -> bool {
         let more = n * (ratio / AIM - 1.0).clamp(LEAST, GROWTH - 1.0);
         let step = u64::from(film.replicates());
         let goal = range.end + (more.ceil() as u64).div_ceil(step) * step;
-        film.tiles_mut().iter_mut().for_each(|tile| tile.set_goal([goal; 2]));
+        film.tiles_mut()
+            .iter_mut()
+            .for_each(|tile| tile.set_goal([goal; 2]));
     } else {
         let wanted = match target.quantile {
             None => by_variance(film, target),
@@ -77,8 +85,11 @@ fn excess(film: &Film, target: &Target) -> Option<f64> {
             (e.ci95[1], e.relmse)
         }
         Some(quantile) => {
-            let mut errors: Vec<f64> =
-                film.tiles().iter().flat_map(|t| t.pixel_errors(None)).collect();
+            let mut errors: Vec<f64> = film
+                .tiles()
+                .iter()
+                .flat_map(|t| t.pixel_errors(None))
+                .collect();
             let e = of_rank(&mut errors, quantile);
             (e * e, e * e)
         }

@@ -17,7 +17,7 @@ pub use techniques::TechniqueStats;
 
 use std::fmt;
 use std::ops::ControlFlow;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -168,6 +168,11 @@ impl Job {
             }
         }
         Ok((film, stats))
+    }
+
+    /// Whether a picture is as good as `target` says.
+    pub fn is_good_enough(&self, film: &Film, target: &Target) -> bool {
+        film.samples() > 0 && adaptive::is_good_enough(film, target)
     }
 
     /// Whether what the integrator keeps beside the film fits into the memory that it may take; if not, what is

@@ -116,4 +116,3 @@ impl Pass<'_> {
         (ledger, invalid)
     }
 }
-

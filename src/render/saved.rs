@@ -36,9 +36,21 @@ impl Identity {
         let settings = [
             ("version of luxel", env!("CARGO_PKG_VERSION").to_string()),
             ("scene", scene_hash.to_string()),
-            ("resolution", format!("{}x{}", job.film.width, job.film.height)),
-            ("crop", format!("{},{},{},{}", crop.x, crop.y, crop.width, crop.height)),
-            ("film", format!("{:?} {:?} {:?}", job.film.filter, job.pixel_format, job.component_format)),
+            (
+                "resolution",
+                format!("{}x{}", job.film.width, job.film.height),
+            ),
+            (
+                "crop",
+                format!("{},{},{},{}", crop.x, crop.y, crop.width, crop.height),
+            ),
+            (
+                "film",
+                format!(
+                    "{:?} {:?} {:?}",
+                    job.film.filter, job.pixel_format, job.component_format
+                ),
+            ),
             ("sampler", job.sampler.name().to_string()),
             ("seed", job.seed.to_string()),
             ("integrator", format!("{:?}", job.integrator)),
@@ -46,7 +58,9 @@ impl Identity {
             ("end", until),
         ];
         Identity {
-            settings: settings.map(|(name, value)| (name.to_string(), value)).into(),
+            settings: settings
+                .map(|(name, value)| (name.to_string(), value))
+                .into(),
         }
     }
 
@@ -155,7 +169,8 @@ impl Saved {
     /// not complete.
     pub fn read(path: &Path) -> Result<Saved, String> {
         let image = Image::read(path).map_err(|e| e.to_string())?;
-        let told: Option<Value> = (image.metadata.as_ref()).and_then(|t| serde_json::from_str(t).ok());
+        let told: Option<Value> =
+            (image.metadata.as_ref()).and_then(|t| serde_json::from_str(t).ok());
         let Some(head) = told.as_ref().and_then(|told| told.get(STATE)) else {
             return Err(
                 "it is a picture, but neither a checkpoint nor a shard: what was summed is not in it".to_string()
@@ -167,7 +182,12 @@ impl Saved {
         let head: Head = serde_json::from_value(head.clone())
             .map_err(|e| format!("what is told of its making is malformed: {e}"))?;
         let [x, y, width, height] = head.window;
-        let window = Window { x, y, width, height };
+        let window = Window {
+            x,
+            y,
+            width,
+            height,
+        };
         let fits = [image.width, image.height] == [width as usize, height as usize]
             && head.replicates.is_power_of_two()
             && head.replicates <= 16
@@ -188,7 +208,9 @@ impl Saved {
             .map_err(|e| e.to_string())?;
         if head.samples.is_some() {
             let goal = [head.goal; 2];
-            film.tiles_mut().iter_mut().for_each(|tile| tile.set_goal(goal));
+            film.tiles_mut()
+                .iter_mut()
+                .for_each(|tile| tile.set_goal(goal));
         }
         Ok(Saved {
             identity: head.identity,
@@ -204,7 +226,10 @@ impl Saved {
 
     /// Whether all of its samples were taken; shards of pictures that end otherwise do not exist.
     fn is_complete(&self) -> bool {
-        let whole = self.shard.zip(self.planned).map(|(shard, spp)| shard.range(spp));
+        let whole = self
+            .shard
+            .zip(self.planned)
+            .map(|(shard, spp)| shard.range(spp));
         whole.is_some() && self.film.range() == whole
     }
 }
@@ -226,17 +251,22 @@ fn planes(image: Image) -> Planes {
 /// In words: parts that do not belong together, are not complete, are there twice, or are missing. `shards` come with
 /// the names that they are told by.
 pub fn merge(mut shards: Vec<(String, Saved)>) -> Result<Saved, String> {
-    let Some((first, of, planned)) = shards.first().and_then(|(name, saved)| {
-        Some((name.clone(), saved.shard?.of, saved.planned?))
-    }) else {
+    let Some((first, of, planned)) = shards
+        .first()
+        .and_then(|(name, saved)| Some((name.clone(), saved.shard?.of, saved.planned?)))
+    else {
         return Err(match shards.first() {
-            Some((name, _)) => format!("{name} is a checkpoint, not a shard: go on with it by --resume"),
+            Some((name, _)) => {
+                format!("{name} is a checkpoint, not a shard: go on with it by --resume")
+            }
             None => "there are no shards".to_string(),
         });
     };
     for (name, saved) in &shards {
         let Some(shard) = saved.shard else {
-            return Err(format!("{name} is a checkpoint, not a shard: go on with it by --resume"));
+            return Err(format!(
+                "{name} is a checkpoint, not a shard: go on with it by --resume"
+            ));
         };
         if let Some(what) = shards[0].1.identity.difference(&saved.identity) {
             return Err(format!("{name} does not belong to {first}: {what}"));
@@ -257,7 +287,10 @@ pub fn merge(mut shards: Vec<(String, Saved)>) -> Result<Saved, String> {
     }
     shards.sort_by_key(|(_, saved)| saved.shard.map(|shard| shard.number));
     let number = |saved: &Saved| saved.shard.map_or(0, |shard| shard.number);
-    if let Some(twice) = shards.windows(2).find(|w| number(&w[0].1) == number(&w[1].1)) {
+    if let Some(twice) = shards
+        .windows(2)
+        .find(|w| number(&w[0].1) == number(&w[1].1))
+    {
         return Err(format!(
             "{} and {} are the same shard, {} of {of}",
             twice[0].0,
@@ -266,14 +299,24 @@ pub fn merge(mut shards: Vec<(String, Saved)>) -> Result<Saved, String> {
         ));
     }
     let missing = |n: &u64| shards.iter().all(|(_, saved)| number(saved) != *n);
-    let missing: Vec<String> = (1..=of).filter(missing).map(|n| format!("{n}/{of}")).collect();
+    let missing: Vec<String> = (1..=of)
+        .filter(missing)
+        .map(|n| format!("{n}/{of}"))
+        .collect();
     if !missing.is_empty() {
         /// More need not be named.
         const SHOWN: usize = 20;
         let more = missing.len().saturating_sub(SHOWN);
-        let and_more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        let and_more = if more > 0 {
+            format!(" and {more} more")
+        } else {
+            String::new()
+        };
         let shown = &missing[..missing.len() - more];
-        return Err(format!("shards are missing: {}{and_more}", shown.join(", ")));
+        return Err(format!(
+            "shards are missing: {}{and_more}",
+            shown.join(", ")
+        ));
     }
     let mut parts = shards.into_iter().map(|(_, saved)| saved);
     let Some(mut whole) = parts.next() else {
@@ -281,7 +324,9 @@ pub fn merge(mut shards: Vec<(String, Saved)>) -> Result<Saved, String> {
     };
     for part in parts {
         let range = part.film.range().unwrap_or(0..0);
-        let added = whole.film.add_planes(&part.film.planes(), &Taken::Range(range));
+        let added = whole
+            .film
+            .add_planes(&part.film.planes(), &Taken::Range(range));
         added.map_err(|e| e.to_string())?;
         let seconds = whole.stats.seconds + part.stats.seconds;
         whole.stats.add(part.stats);

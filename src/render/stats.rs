@@ -120,4 +120,3 @@ impl Stats {
         self.rays.total() as f64 / self.seconds.max(1e-9)
     }
 }
-

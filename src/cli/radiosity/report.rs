@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::Seconds;
-use crate::cli::render::peak_memory;
+use crate::cli::told::peak_memory;
 use crate::radiosity::{FormFactorMethod, Rgb64, Solution, SolveSpec, Solver};
 
 /// Lines of a name and what is to be said of it.
