@@ -140,7 +140,9 @@ fn rendered(xml: &str, threads: usize) -> (Vec<[f64; 3]>, bool) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     // Samples that may be followed by any number.
     let mut film = compiled.job.new_film(Stop::Spp(4));
-    let stats = pool.unwrap().install(|| compiled.job.add_samples(&mut film, 4));
+    let stats = pool
+        .unwrap()
+        .install(|| compiled.job.add_samples(&mut film, 4));
     (film.mean(), stats.unwrap().solution.is_some())
 }
 

@@ -7,6 +7,7 @@ mod numbers;
 mod progress;
 mod radiosity;
 mod render;
+mod study;
 
 use std::ffi::OsString;
 use std::fmt;
@@ -37,6 +38,7 @@ enum Command {
     /// Render a scene to an image, with an estimate of its error
     Render(Box<render::RenderArgs>),
     Compare(Box<compare::CompareArgs>),
+    Study(Box<study::StudyArgs>),
     /// Solve for the radiosity of a scene, and write it as a mesh with colours
     Radiosity(Box<radiosity::RadiosityArgs>),
     /// Show what a scene contains and what is modelled for it, or what is supported at all
@@ -144,6 +146,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let result = match &cli.command {
         Command::Render(args) => render::run(args, &line),
         Command::Compare(args) => compare::run(args),
+        Command::Study(args) => study::run(args, &line),
         Command::Radiosity(args) => radiosity::run(args, &line),
         Command::Info(args) => info::run(args),
         Command::Completions { shell } => {

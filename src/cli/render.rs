@@ -17,6 +17,7 @@ use crate::film::{Film, Window};
 use crate::format::{self, Overrides};
 use crate::image_io::{self, Image};
 use crate::render::{Job, Metadata, Stats, Stop, TechniqueStats, percent};
+pub(super) use crate::study::memory::peak as peak_memory;
 
 #[derive(Args, Debug)]
 pub struct RenderArgs {
@@ -71,7 +72,7 @@ pub struct RenderArgs {
     pub stats: Option<PathBuf>,
 }
 
-fn parse_duration(text: &str) -> Result<Duration, String> {
+pub fn parse_duration(text: &str) -> Result<Duration, String> {
     let split = text
         .find(|c: char| c.is_ascii_alphabetic())
         .unwrap_or(text.len());
@@ -105,7 +106,7 @@ fn parse_numbers<const N: usize>(
         .ok_or_else(|| format!("expected {form}"))
 }
 
-fn parse_resolution(text: &str) -> Result<[u32; 2], String> {
+pub fn parse_resolution(text: &str) -> Result<[u32; 2], String> {
     parse_numbers(text, 'x', "a size such as 640x480")
 }
 
@@ -427,12 +428,4 @@ fn statistics(
         })),
         "plan": plan,
     })
-}
-
-/// Most memory the program has held, in bytes, where the system tells it (Linux).
-pub(super) fn peak_memory() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
-    let kib: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some(kib * 1024)
 }
