@@ -146,8 +146,11 @@ struct Variant {
 }
 
 impl Variant {
+    /// In place of what was set before.
     fn set(&mut self, name: &str, value: &str) {
         let value = value.to_string();
+        let before = format!("{name}=");
+        self.label.retain(|part| !part.starts_with(&before));
         self.label.push(format!("{name}={value}"));
         match name {
             "sampler" => self.sampler = Some(value),
@@ -295,18 +298,19 @@ fn reference(
         },
         None => {
             let unbiased = methods.iter().position(|m| !m.job.integrator.biased());
-            unbiased.map_or_else(
-                || Variant {
-                    integrator: Some("path".to_string()),
-                    indirect: Some("none".to_string()),
-                    ..variants[0].clone()
-                },
-                |i| variants[i].clone(),
-            )
+            match unbiased {
+                Some(i) => variants[i].clone(),
+                None => {
+                    let mut path = variants[0].clone();
+                    path.integrator = Some("path".to_string());
+                    path.set("indirect", "none");
+                    path
+                }
+            }
         }
     };
     // Its error falls fastest, whatever is studied.
-    variant.sampler = Some("sobol".to_string());
+    variant.set("sampler", "sobol");
     let method = method(args, &variant, warned)?;
     if method.job.integrator.biased() {
         eprintln!(

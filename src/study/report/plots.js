@@ -10,7 +10,8 @@ function short(v) {
   if (v === null || v === undefined || !Number.isFinite(v)) return "–";
   if (v === 0) return "0";
   const size = Math.abs(v);
-  if (size >= 1e6 || size < 1e-3) return v.toExponential(2);
+  if (size >= 1e12 || size < 1e-3) return v.toExponential(2);
+  for (const [unit, name] of [[1e9, " G"], [1e6, " M"]]) if (size >= unit) return String(Number((v / unit).toPrecision(3))) + name;
   if (size >= 1000) return Math.round(v).toLocaleString("en");
   return String(Number(v.toPrecision(3)));
 }

@@ -1,6 +1,6 @@
 // Head, tables and commands.
 
-const cell = (e, f) => (e ? [f(e.value), make("br"), make("span", { class: "range" }, `${f(e.ci95[0])} – ${f(e.ci95[1])}`)] : ["–"]);
+const cell = (e, f) => (e ? [f(e.value), make("br"), make("span", { class: "range" }, `${f(e.ci95[0])} to ${f(e.ci95[1])}`)] : ["–"]);
 const three = (v) => (v === null || v === undefined ? "–" : v.toFixed(3));
 
 function biasText(m) {
@@ -20,7 +20,7 @@ function forecastText(f) {
   if (f.kind === "exact") return ["at once"];
   if (f.kind === "never") return ["never: bias " + percent(f.bias)];
   if (f.kind === "unknown") return ["–"];
-  const times = (e) => `${short(Math.max(1, e.ci95[0]))} – ${short(e.ci95[1])}`;
+  const times = (e) => `${short(Math.max(1, e.ci95[0]))} to ${short(e.ci95[1])}`;
   return [`${short(Math.max(1, f.spp.value))} spp, ${short(f.seconds.value)} s`, make("br"), make("span", { class: "range" }, times(f.spp) + " spp")];
 }
 
