@@ -69,6 +69,16 @@ impl Row {
         })
     }
 
+    /// Of how many runs that told an interval of their own relMSE it holds the one measured here, less what
+    /// the reference's own adds (`own`); and how many told one.
+    pub fn claims_held(&self, own: f64) -> [usize; 2] {
+        let pairs = self.records.iter().zip(&self.each);
+        let told = pairs.filter_map(|(r, [relmse, _])| Some((r.claimed?, relmse - own)));
+        told.fold([0, 0], |[held, all], ([_, low, high], relmse)| {
+            [held + usize::from(low <= relmse && relmse <= high), all + 1]
+        })
+    }
+
     pub fn fit_point(&self) -> FitPoint {
         FitPoint {
             spp: self.spp,
@@ -151,7 +161,7 @@ pub fn mark_front(rows: &mut [Row]) {
         .collect();
     for (i, row) in rows.iter_mut().enumerate() {
         let beats = |b: &[f64; 2]| b[0] <= at[i][0] && b[1] <= at[i][1] && *b != at[i];
-        row.front = !at.iter().any(|b| beats(b));
+        row.front = !at.iter().any(beats);
     }
 }
 

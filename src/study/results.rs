@@ -167,6 +167,7 @@ fn row_json(study: &Study, findings: &Findings, row: &Row) -> Value {
         "brightness": row.brightness.map(estimate),
         "flip": estimate(row.flip),
         "efficiency": row.efficiency().map(estimate),
+        "claims_held": row.claims_held(findings.reference.rel_mse.unwrap_or(0.0)),
         "front": row.front,
         "images": {
             "mean": image("mean.exr"),

@@ -52,7 +52,8 @@ function startTables() {
     ["memory, MiB", (p) => (p.peak_memory_bytes ? short(p.peak_memory_bytes / 1048576) : "–")],
     ["error", (p) => cell(p.error, percent)], ["bias", (p) => cell(p.bias, percent)], ["noise", (p) => cell(p.noise, percent)],
     ["brightness", (p) => cell(p.brightness, percent)], ["relMSE", (p) => cell(p.relmse, short)], ["RMSE", (p) => cell(p.rmse, short)],
-    ["FLIP", (p) => cell(p.flip, short)], ["efficiency", (p) => cell(p.efficiency, short)], ["front", (p) => (p.front ? "yes" : "")],
+    ["FLIP", (p) => cell(p.flip, short)], ["efficiency", (p) => cell(p.efficiency, short)], ["claims held", (p) => (p.claims_held[1] ? p.claims_held.join(" of ") : "–")],
+    ["front", (p) => (p.front ? "yes" : "")],
   ];
   byId("table").append(make("thead", {}, row(columns.map(([name]) => name), true)),
     make("tbody", {}, ...POINTS.map((p) => row(columns.map(([, f]) => f(p))))));

@@ -42,7 +42,7 @@ fn moments(noise: &mut Noise, runs: usize, bias: f32, sd: f32, of_reference: f32
         variance: Some(variance),
     };
     // A bias of either sign.
-    let wrong = |i: usize| truth(i) + if i % 2 == 0 { bias } else { -bias };
+    let wrong = |i: usize| truth(i) + if i.is_multiple_of(2) { bias } else { -bias };
     let pictures: Vec<Picture> = (0..runs)
         .map(|_| noise.picture(PIXELS, wrong, sd))
         .collect();
