@@ -79,9 +79,10 @@ pub struct Method {
 pub enum ReferenceChoice {
     /// A picture that is given.
     File(PathBuf),
-    /// Made by this method, in at most this time.
+    /// Made in at most this time: by this method, or by the most efficient of the unbiased ones that are
+    /// studied, of which there is one then.
     Made {
-        method: Box<Method>,
+        method: Option<Box<Method>>,
         limit: Duration,
     },
 }

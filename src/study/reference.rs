@@ -60,7 +60,10 @@ impl Known {
 /// A reference in the making: the mean of parts rendered one after the other, each with its own seed.
 pub struct Maker<'a> {
     plan: &'a Plan,
-    method: &'a mut Method,
+    label: String,
+    /// Hash of what determines it, but for the number of samples.
+    name: String,
+    window: Window,
     path: PathBuf,
     spp: u64,
     seconds: f64,
@@ -76,33 +79,33 @@ const GROWTH: u64 = 3;
 
 impl<'a> Maker<'a> {
     /// What is kept in the folder from an earlier time, or nothing yet.
-    pub fn new(plan: &'a Plan, method: &'a mut Method) -> Maker<'a> {
+    pub fn new(plan: &'a Plan, method: &Method) -> Maker<'a> {
         let name = hash(&format!("{}|seed {}", method.settings, plan.base_seed));
-        let path = plan
-            .folder
-            .join(format!("reference-{}-{name}.exr", slug(&method.label)));
+        let file = format!("reference-{}-{name}.exr", slug(&method.label));
         let mut maker = Maker {
             plan,
-            method,
-            path,
+            label: method.label.clone(),
+            name,
+            window: method.job.film.crop,
+            path: plan.folder.join(file),
             spp: 0,
             seconds: 0.0,
             mean: Vec::new(),
             variance: Vec::new(),
         };
         // What cannot be read is made anew.
-        let _ = maker.take_up(&name);
+        let _ = maker.take_up();
         maker
     }
 
-    fn take_up(&mut self, name: &str) -> Option<()> {
+    fn take_up(&mut self) -> Option<()> {
         let text = read_metadata(&self.path).ok()??;
         let v: Value = serde_json::from_str(&text).ok()?;
-        if v["luxel_study"] != FORMAT || v["hash"] != name {
+        if v["luxel_study"] != FORMAT || v["hash"] != *self.name {
             return None;
         }
         let (spp, seconds) = (v["spp"].as_u64()?, v["seconds"].as_f64()?);
-        let known = Known::read(&self.path, self.method.job.film.crop).ok()?;
+        let known = Known::read(&self.path, self.window).ok()?;
         let wide = |p: &Rgb| p.to_array().map(f64::from);
         self.variance = known.reference.variance?.iter().map(wide).collect();
         self.mean = known.reference.picture.pixels.iter().map(wide).collect();
@@ -115,7 +118,7 @@ impl<'a> Maker<'a> {
         if self.spp == 0 {
             return None;
         }
-        let window = self.method.job.film.crop;
+        let window = self.window;
         let reference = Reference {
             picture: Picture {
                 width: window.width as usize,
@@ -129,7 +132,7 @@ impl<'a> Maker<'a> {
             reference,
             path: self.path.clone(),
             spp: Some(self.spp),
-            method: Some(self.method.label.clone()),
+            method: Some(self.label.clone()),
             seconds: self.seconds,
         })
     }
@@ -152,14 +155,14 @@ impl<'a> Maker<'a> {
     /// The scene cannot be rendered so, or the file cannot be written.
     pub fn extend(
         &mut self,
+        method: &mut Method,
         n: u64,
         limit: Duration,
         stopped: &dyn Fn() -> bool,
     ) -> Result<(), StudyError> {
-        self.method.job.seed = self.plan.reference_seed(self.spp);
+        method.job.seed = self.plan.reference_seed(self.spp);
         let start = Instant::now();
-        let rendered = self
-            .method
+        let rendered = method
             .job
             .render(super::plan::Amount::Spp(n).stop(), |film, _| {
                 let enough = start.elapsed() >= limit && film.has_error();
@@ -195,7 +198,7 @@ impl<'a> Maker<'a> {
     }
 
     fn write(&self) -> Result<(), StudyError> {
-        let window = self.method.job.film.crop;
+        let window = self.window;
         let mean: Vec<Rgb> = self.mean.iter().map(to_rgb).collect();
         let stderr: Vec<Rgb> = self
             .variance
@@ -206,14 +209,10 @@ impl<'a> Maker<'a> {
         image
             .layers
             .push(Layer::from_rgb("stderr", &stderr, Samples::Float));
-        let name = hash(&format!(
-            "{}|seed {}",
-            self.method.settings, self.plan.base_seed
-        ));
         let metadata = json!({
             "luxel_study": FORMAT,
-            "hash": name,
-            "method": self.method.label,
+            "hash": self.name,
+            "method": self.label,
             "spp": self.spp,
             "seconds": self.seconds,
             "relmse": self.known().and_then(|k| k.rel_mse),

@@ -3,9 +3,10 @@
 use std::time::Duration;
 
 use super::evaluate::{self, Row};
-use super::plan::{Method, ReferenceChoice, Study, StudyError};
+use super::plan::{Method, Plan, ReferenceChoice, Study, StudyError};
 use super::reference::{Known, Maker, TIMES_BELOW};
 use super::runs::{self, Record};
+use super::statistics::{Gram, Weighing, mean_picture};
 use super::{Picture, report, results};
 use crate::math::Rgb;
 
@@ -129,7 +130,11 @@ fn reference(
         }
         ReferenceChoice::Made { method, limit } => (method, *limit),
     };
-    let mut maker = Maker::new(plan, method);
+    let best = match method {
+        Some(_) => 0,
+        None => most_efficient(plan, methods)?,
+    };
+    let mut maker = Maker::new(plan, method.as_deref().unwrap_or(&methods[best]));
     let spent = maker.known().map_or(0.0, |k| k.seconds);
     // The limit is for all calls together.
     let mut left = limit.saturating_sub(Duration::from_secs_f64(spent.max(0.0)));
@@ -150,7 +155,11 @@ fn reference(
         }
         let n = maker.next_part(now, target);
         let before = maker.known().map_or(0.0, |k| k.seconds);
-        maker.extend(n, left, stopped)?;
+        let by = match method {
+            Some(method) => method,
+            None => &mut methods[best],
+        };
+        maker.extend(by, n, left, stopped)?;
         let Some(known) = maker.known() else {
             continue;
         };
@@ -164,9 +173,41 @@ fn reference(
     }
 }
 
+/// The unbiased method whose runs at the largest amount have the least relative variance times seconds; among
+/// those that find all light, if there are any. The first method where none is unbiased.
+fn most_efficient(plan: &Plan, methods: &[Method]) -> Result<usize, StudyError> {
+    let unbiased = |m: &&usize| !methods[**m].job.integrator.biased();
+    let whole = |m: &usize| !["direct", "ptracer"].contains(&methods[*m].job.integrator.name());
+    let all: Vec<usize> = (0..methods.len()).collect();
+    let mut candidates: Vec<usize> = all.iter().filter(unbiased).copied().collect();
+    if candidates.iter().any(whole) {
+        candidates.retain(whole);
+    }
+    let Some(&amount) = plan.amounts.last() else {
+        return Ok(0);
+    };
+    let mut best = (f64::INFINITY, candidates.first().copied().unwrap_or(0));
+    for m in candidates {
+        let runs = 0..plan.runs;
+        let pictures = runs
+            .clone()
+            .map(|run| runs::picture(plan, &methods[m], amount, run));
+        let pictures: Vec<Picture> = pictures.collect::<Result<_, _>>()?;
+        let records = runs.filter_map(|run| runs::kept(plan, &methods[m], amount, run));
+        let seconds: f64 = records.map(|r| r.seconds).sum();
+        let mean = picture_of(pictures[0].width, &mean_picture(&pictures));
+        let spread = Gram::of(&pictures, &mean, Weighing::Relative).squares();
+        let cost = seconds * spread.iter().sum::<f64>();
+        if cost < best.0 {
+            best = (cost, m);
+        }
+    }
+    Ok(best.1)
+}
+
 /// The relMSE that the reference should have: that of the best setting, with errors [`TIMES_BELOW`] times
 /// smaller. Zero where a setting is as good as the reference itself: then it can never be good enough.
-fn target(plan: &super::plan::Plan, methods: &[Method], known: &Known) -> Result<f64, StudyError> {
+fn target(plan: &Plan, methods: &[Method], known: &Known) -> Result<f64, StudyError> {
     let own = known.rel_mse.unwrap_or(0.0);
     let mut smallest = f64::INFINITY;
     for method in methods {

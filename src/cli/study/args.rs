@@ -39,7 +39,7 @@ pub struct StudyArgs {
     /// Compare with this picture [default: one is made]
     #[arg(long, value_name = "FILE", conflicts_with_all = ["reference_integrator", "reference_time"])]
     pub reference: Option<PathBuf>,
-    /// Make the reference by this integrator [default: the first unbiased one that is studied, direct and ptracer last; else path]
+    /// Make the reference by this integrator [default: the most efficient of the unbiased methods that are studied, direct and ptracer last; else path]
     #[arg(long, value_name = "NAME")]
     pub reference_integrator: Option<String>,
     /// Most time to make the reference in; it ends earlier when its error is 10 times below the smallest one studied

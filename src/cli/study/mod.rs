@@ -178,38 +178,30 @@ fn quoted(text: &str) -> String {
     }
 }
 
-/// What makes the reference: the method asked for, or the first that is unbiased, or path tracing.
+/// What makes the reference: the method asked for, or path tracing where no method that is studied is unbiased;
+/// else the study chooses among them.
 fn reference(
     args: &StudyArgs,
-    variants: &[Variant],
+    first: &Variant,
     methods: &[Method],
     warned: &mut Vec<String>,
 ) -> Result<ReferenceChoice, Failure> {
     if let Some(path) = &args.reference {
         return Ok(ReferenceChoice::File(path.clone()));
     }
-    let mut variant = match &args.reference_integrator {
-        Some(name) => Variant {
-            integrator: Some(name.clone()),
-            ..variants[0].clone()
-        },
-        None => {
-            // These two leave out light that the others find.
-            let partial = |m: &Method| ["direct", "ptracer"].contains(&m.job.integrator.name());
-            let unbiased = |m: &Method| !m.job.integrator.biased();
-            let whole = methods.iter().position(|m| unbiased(m) && !partial(m));
-            let unbiased = whole.or_else(|| methods.iter().position(unbiased));
-            match unbiased {
-                Some(i) => variants[i].clone(),
-                None => {
-                    let mut path = variants[0].clone();
-                    path.integrator = Some("path".to_string());
-                    path.set("indirect", "none");
-                    path
-                }
-            }
+    let limit = args.reference_time.unwrap_or(Duration::from_secs(600));
+    let mut variant = first.clone();
+    match &args.reference_integrator {
+        Some(name) => variant.integrator = Some(name.clone()),
+        None if methods.iter().any(|m| !m.job.integrator.biased()) => {
+            let method = None;
+            return Ok(ReferenceChoice::Made { method, limit });
         }
-    };
+        None => {
+            variant.integrator = Some("path".to_string());
+            variant.set("indirect", "none");
+        }
+    }
     // Its error falls fastest, whatever is studied.
     variant.set("sampler", "sobol");
     let method = method(args, &variant, warned)?;
@@ -220,8 +212,8 @@ fn reference(
         );
     }
     Ok(ReferenceChoice::Made {
-        method: Box::new(method),
-        limit: args.reference_time.unwrap_or(Duration::from_secs(600)),
+        method: Some(Box::new(method)),
+        limit,
     })
 }
 
@@ -281,7 +273,7 @@ pub fn run(args: &StudyArgs, command_line: &str) -> Result<Outcome, Failure> {
             .collect();
         let methods = methods?;
         check_labels(&methods)?;
-        let reference = reference(args, &variants, &methods, &mut warned)?;
+        let reference = reference(args, &variants[0], &methods, &mut warned)?;
         Ok::<Study, Failure>(Study {
             plan,
             methods,
