@@ -266,7 +266,8 @@ fn method_line(method: &Value) -> String {
     let number = |v: &Value| v.as_f64().unwrap_or(f64::NAN);
     let percent = |v: &Value| format!("{:.2} %", 100.0 * number(v));
     let slope = match &method["error_slope"] {
-        Value::Null => "slope none".to_string(),
+        Value::Null if method["exact"] == true => "slope none".to_string(),
+        Value::Null => "no slope from one setting".to_string(),
         line => format!(
             "slope {:.3} (95 %: {:.3} to {:.3})",
             number(&line["slope"]),

@@ -88,7 +88,7 @@ function startPictures() {
   byId("pictures-note").textContent = "Left: the first run of the chosen setting." + (PICTURES.block > 1
     ? ` Pictures on this page are means of ${PICTURES.block} × ${PICTURES.block} pixels, which hides noise; those in the folder images are not.` : "");
   // As large as fits, in steps of the control.
-  const fit = Math.log2(Math.min(byId("viewport").clientWidth / R.resolution[0], innerHeight / R.resolution[1]) * PICTURES.block);
+  const fit = Math.log2(Math.min(byId("viewport").clientWidth / R.resolution[0], (0.7 * innerHeight) / R.resolution[1], 8 / PICTURES.block) * PICTURES.block);
   byId("zoom").value = String(Math.max(0, Math.min(5, Math.floor(2 * fit) / 2)));
   split(50);
   showPair();

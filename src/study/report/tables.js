@@ -40,7 +40,7 @@ function startTables() {
   const wanted = METHODS.length ? METHODS[0].forecasts.map((f) => f.wanted) : [];
   byId("findings").append(make("thead", {}, row(["method", "slope of error", "slope of noise", "bias", "bias floor from", "best efficiency",
     ...wanted.map((w) => `for ${percent(w)}`)], true)), make("tbody", {}, ...METHODS.map((m) => {
-    const slope = (l) => (l ? cell({ value: l.slope, ci95: l.ci95 }, three) : "none");
+    const slope = (l) => (l ? cell({ value: l.slope, ci95: l.ci95 }, three) : m.exact ? "none" : "–");
     const best = Math.max(0, ...POINTS.filter((p) => p.method === m.label && p.efficiency).map((p) => p.efficiency.value));
     return row([m.label + (m.biased ? " (biased)" : ""), slope(m.error_slope), slope(m.noise_slope), biasText(m), floorText(m),
       best ? short(best) : "–", ...m.forecasts.map(forecastText)]);
