@@ -36,7 +36,7 @@ const CRATES: [(&str, &[&str]); 16] = [
     ("faer", &["radiosity"]),
     ("spade", &["radiosity"]),
     ("kiddo", &["transport"]),
-    ("serde_json", &["radiosity", "render", "cli"]),
+    ("serde_json", &["radiosity", "render", "study", "cli"]),
     ("sobol_burley", &["sampler"]),
     ("rand_pcg", &["sampler"]),
     ("exr", &["image_io"]),

@@ -10,6 +10,7 @@ mod progress;
 mod radiosity;
 mod render;
 mod resume;
+mod study;
 mod told;
 
 use std::ffi::OsString;
@@ -43,6 +44,7 @@ enum Command {
     Compare(Box<compare::CompareArgs>),
     /// Join the shards of a picture that `render --shard` made
     Merge(merge::MergeArgs),
+    Study(Box<study::StudyArgs>),
     /// Solve for the radiosity of a scene, and write it as a mesh with colours
     Radiosity(Box<radiosity::RadiosityArgs>),
     /// Show what a scene contains and what is modelled for it, or what is supported at all
@@ -151,6 +153,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Render(args) => render::run(args, &line),
         Command::Compare(args) => compare::run(args),
         Command::Merge(args) => merge::run(args, &line),
+        Command::Study(args) => study::run(args, &line),
         Command::Radiosity(args) => radiosity::run(args, &line),
         Command::Info(args) => info::run(args),
         Command::Completions { shell } => {

@@ -12,13 +12,13 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use super::numbers::whole;
 use super::preview::{self, Viewer};
 use super::progress::{Progress, ProgressMode};
-use super::resume::{Checkpoints, Interval, parse_interval};
+use super::resume::{Checkpoints, Interval, Rendering, parse_interval};
 use super::told::{self, Seconds};
 use super::{Failure, Outcome};
 use crate::film::Window;
 use crate::format::{self, Overrides};
 use crate::image_io::{self, Image};
-use crate::render::{Identity, Metadata, Shard, Stats, Stop, Target, Work};
+use crate::render::{Metadata, Shard, Stats, Stop, Target, Work};
 
 #[derive(Args, Debug)]
 pub struct RenderArgs {
@@ -169,7 +169,7 @@ fn parse_numbers<const N: usize>(
         .ok_or_else(|| format!("expected {form}"))
 }
 
-fn parse_resolution(text: &str) -> Result<[u32; 2], String> {
+pub fn parse_resolution(text: &str) -> Result<[u32; 2], String> {
     parse_numbers(text, 'x', "a size such as 640x480")
 }
 
@@ -260,18 +260,17 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
         scene_hash: compiled.hash.clone(),
         command_line: command_line.to_string(),
     };
-    let identity = Identity::new(job, stop, &desc.fingerprint());
-    let mut checkpoints =
-        Checkpoints::new(&outputs[0], args.checkpoint.0, (job, &identity, &metadata));
+    let rendering = Rendering::new(job, work, &desc, &metadata);
+    let mut checkpoints = Checkpoints::new(&outputs[0], args.checkpoint.0, &rendering);
     let (film, stats) = match args.resume {
-        true => checkpoints.resume(&work)?,
+        true => checkpoints.resume()?,
         false => (job.film_for(&work), Stats::default()),
     };
     let mut progress = Progress::new(args.progress);
     let rendered = pool.install(|| {
         job.go_on(&work, film, stats, |film, stats| {
             progress.update(film, stats, stop);
-            let warning = checkpoints.update(&work, film, stats);
+            let warning = checkpoints.update(film, stats);
             warning.iter().for_each(|w| progress.warn(w));
             let warning = preview.as_mut().and_then(|p| p.update(film));
             warning.iter().for_each(|w| progress.warn(w));
@@ -290,15 +289,15 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
     let write_start = Instant::now();
     let interrupted = stopped.load(Ordering::Relaxed);
     if interrupted {
-        checkpoints.write(&work, &film, &stats)?;
+        checkpoints.write(&film, &stats)?;
     }
     let image = match work.shard {
         None => job.picture(&film, &stats, &metadata),
-        Some(_) => job.to_be_saved(&identity, &work, &film, &stats, &metadata),
+        Some(_) => rendering.image(&film, &stats)?,
     };
     if let Err(failure) = told::write_all(&image, &outputs) {
         // What took long must not be lost to a bad path.
-        let kept = checkpoints.write(&work, &film, &stats);
+        let kept = checkpoints.write(&film, &stats);
         return Err(match kept {
             Ok(path) => Failure::Output(format!(
                 "{failure}; what was rendered is kept in {}: go on by --resume",
@@ -332,7 +331,7 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
             // A picture that ran out of time may be gone on with.
             match args.target_error {
                 Some(target) if !job.is_good_enough(&film, &target) => {
-                    checkpoints.write(&work, &film, &stats)?;
+                    checkpoints.write(&film, &stats)?;
                 }
                 _ => checkpoints.remove(),
             }

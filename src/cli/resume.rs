@@ -6,7 +6,10 @@ use std::time::{Duration, Instant};
 use super::Failure;
 use super::render::parse_duration;
 use crate::film::Film;
+use crate::format::SceneDesc;
+use crate::image_io::Image;
 use crate::render::{Identity, Job, Metadata, Saved, Stats, Work};
+use std::sync::OnceLock;
 
 /// Time between two checkpoints; `None`: there are none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,11 +25,52 @@ pub fn parse_interval(text: &str) -> Result<Interval, String> {
     }
 }
 
+/// What is rendered.
+pub struct Rendering<'a> {
+    pub job: &'a Job,
+    pub work: Work,
+    pub desc: &'a SceneDesc,
+    pub metadata: &'a Metadata,
+    /// Found out when it is needed first: a short render needs it not at all.
+    identity: OnceLock<Identity>,
+}
+
+impl<'a> Rendering<'a> {
+    pub fn new(job: &'a Job, work: Work, desc: &'a SceneDesc, metadata: &'a Metadata) -> Self {
+        Rendering {
+            job,
+            work,
+            desc,
+            metadata,
+            identity: OnceLock::new(),
+        }
+    }
+
+    pub fn identity(&self) -> Result<&Identity, Failure> {
+        if let Some(known) = self.identity.get() {
+            return Ok(known);
+        }
+        let unread = |e| {
+            Failure::Input(format!(
+                "a file that the scene names cannot be read again: {e}"
+            ))
+        };
+        let hash = self.desc.content_hash().map_err(unread)?;
+        Ok((self.identity).get_or_init(|| Identity::new(self.job, self.work.stop, &hash)))
+    }
+
+    /// What was done so far, as a file keeps it.
+    pub fn image(&self, film: &Film, stats: &Stats) -> Result<Image, Failure> {
+        let identity = self.identity()?;
+        Ok((self.job).to_be_saved(identity, &self.work, film, stats, self.metadata))
+    }
+}
+
 /// The file beside an output that keeps what was done.
 pub struct Checkpoints<'a> {
     path: PathBuf,
     interval: Option<Duration>,
-    of: (&'a Job, &'a Identity, &'a Metadata),
+    of: &'a Rendering<'a>,
     last: Instant,
     /// What the last one took.
     took: Duration,
@@ -39,7 +83,7 @@ impl<'a> Checkpoints<'a> {
     pub fn new(
         output: &Path,
         interval: Option<Duration>,
-        of: (&'a Job, &'a Identity, &'a Metadata),
+        of: &'a Rendering<'a>,
     ) -> Checkpoints<'a> {
         Checkpoints {
             path: output.with_extension("checkpoint.exr"),
@@ -53,8 +97,8 @@ impl<'a> Checkpoints<'a> {
     }
 
     /// What was done before.
-    pub fn resume(&mut self, work: &Work) -> Result<(Film, Stats), Failure> {
-        let (job, identity, _) = self.of;
+    pub fn resume(&mut self) -> Result<(Film, Stats), Failure> {
+        let Rendering { job, work, .. } = self.of;
         let shown = self.path.display();
         if !self.path.exists() {
             eprintln!("there is no {shown}: rendering from the start");
@@ -66,7 +110,7 @@ impl<'a> Checkpoints<'a> {
             ))
         };
         let saved = Saved::read(&self.path).map_err(wrong)?;
-        if let Some(what) = identity.difference(&saved.identity) {
+        if let Some(what) = self.of.identity()?.difference(&saved.identity) {
             return Err(wrong(what));
         }
         if saved.shard != work.shard {
@@ -77,23 +121,22 @@ impl<'a> Checkpoints<'a> {
     }
 
     /// Writes one if it is time to: gives a warning if that fails, once.
-    pub fn update(&mut self, work: &Work, film: &Film, stats: &Stats) -> Option<String> {
+    pub fn update(&mut self, film: &Film, stats: &Stats) -> Option<String> {
         /// Share of the time that writing may take.
         const SHARE: u32 = 100;
         let interval = self.interval?.max(self.took * SHARE);
         if self.last.elapsed() < interval || film.samples() == 0 || stats.solving.is_some() {
             return None;
         }
-        let failure = self.write(work, film, stats).err()?;
+        let failure = self.write(film, stats).err()?;
         let first = !std::mem::replace(&mut self.failed, true);
         first.then(|| format!("{failure}; rendering goes on without a checkpoint"))
     }
 
-    pub fn write(&mut self, work: &Work, film: &Film, stats: &Stats) -> Result<&Path, Failure> {
+    pub fn write(&mut self, film: &Film, stats: &Stats) -> Result<&Path, Failure> {
         let start = Instant::now();
-        let (job, identity, metadata) = self.of;
-        let image = job.to_be_saved(identity, work, film, stats, metadata);
-        let written = image.write(&self.path);
+        let image = self.of.image(film, stats);
+        let written = image.and_then(|image| Ok(image.write(&self.path)?));
         (self.last, self.took) = (Instant::now(), start.elapsed());
         written?;
         self.exists = true;

@@ -10,6 +10,7 @@ use super::progress::human_seconds;
 use crate::film::Film;
 use crate::image_io::Image;
 use crate::render::{Job, Metadata, Stats, Stop, TechniqueStats, percent};
+use crate::study::memory;
 
 pub(super) struct Seconds {
     pub load: Duration,
@@ -172,7 +173,7 @@ pub(super) fn statistics(
             "photon": stats.rays.photon,
         },
         "rays_per_second": stats.rays_per_second(),
-        "peak_memory_bytes": peak_memory(),
+        "peak_memory_bytes": memory::peak(),
         "estimated_error": film.estimate_error().map(|e| json!({ "relmse": e.relmse, "ci95": e.ci95 })),
         "invalid_samples": stats.invalid.count,
         "techniques": techniques,
@@ -193,14 +194,6 @@ pub(super) fn statistics(
         })),
         "plan": plan,
     })
-}
-
-/// Most memory the program has held, in bytes, where the system tells it (Linux).
-pub(super) fn peak_memory() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
-    let kib: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some(kib * 1024)
 }
 
 /// Says so where the picture is not as good as was asked for.

@@ -111,14 +111,6 @@ impl Mark {
     }
 }
 
-/// Start of FNV-1a: stable over versions and platforms, which the standard hasher does not promise.
-const FNV: u64 = 0xcbf2_9ce4_8422_2325;
-
-fn fnv(start: u64, bytes: &[u8]) -> u64 {
-    let step = |hash: u64, byte: &u8| (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
-    bytes.iter().fold(start, step)
-}
-
 impl SceneDesc {
     /// The scene itself; its children are the objects of the file.
     pub fn scene(&self) -> Props<'_> {
@@ -142,32 +134,18 @@ impl SceneDesc {
     /// Hash of everything the description says, after substitution, as 16 hexadecimal digits. The
     /// contents of mesh and image files are not in it, only their names.
     pub fn hash(&self) -> String {
-        self.hashed(|value| format!("{value:?}"))
-    }
-
-    /// The same with the contents of these files in place of their names, so that it is the same wherever they lie.
-    /// Files that cannot be read are told apart from all others by their names.
-    pub fn fingerprint(&self) -> String {
-        self.hashed(|value| match value {
-            Value::File(path) => match std::fs::read(path) {
-                Ok(bytes) => format!("file {} {:016x}", bytes.len(), fnv(FNV, &bytes)),
-                Err(_) => format!("{value:?}"),
-            },
-            value => format!("{value:?}"),
-        })
-    }
-
-    fn hashed(&self, text: impl Fn(&Value) -> String) -> String {
-        let mut hash = FNV;
+        // FNV-1a: stable over versions and platforms, which the standard hasher does not promise.
+        let mut hash: u64 = 0xcbf2_9ce4_8422_2325;
         let mut add = |text: &str| {
-            hash = fnv(hash, text.as_bytes());
-            hash = fnv(hash, &[0]);
+            for byte in text.bytes().chain([0]) {
+                hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+            }
         };
         for object in &self.objects {
             add(object.plugin.name);
             for p in &object.params {
                 add(&p.name);
-                add(&text(&p.value));
+                add(&format!("{:?}", p.value));
             }
             for c in &object.children {
                 add(c.name.as_deref().unwrap_or_default());

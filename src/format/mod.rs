@@ -6,6 +6,7 @@
 mod check;
 mod cie;
 pub mod compile;
+mod content;
 mod desc;
 mod error;
 mod limits;

@@ -246,6 +246,14 @@ impl Image {
             .and_then(|bytes| write_atomic(path, &bytes))
     }
 
+    /// The picture as the bytes of a PNG, as [`Image::write`] would write it.
+    ///
+    /// # Errors
+    /// It has no colours, or is too large.
+    pub fn png(&self) -> Result<Vec<u8>, String> {
+        self.encode(Kind::Png)
+    }
+
     /// Whether the extension of `path` is one that [`Image::write`] knows.
     pub fn can_write_extension(path: impl AsRef<Path>) -> bool {
         Kind::of_target(path.as_ref()).is_ok()

@@ -38,7 +38,7 @@ pub fn signed_difference(image: &Picture, reference: &Picture) -> Picture {
 pub fn error_map(image: &Picture, reference: &Picture, scale: Option<f64>) -> ErrorMap {
     let difference = signed_difference(image, reference);
     let errors: Vec<f32> = difference.pixels.iter().map(|p| p.luminance()).collect();
-    let scale = scale.unwrap_or_else(|| choose_scale(&errors));
+    let scale = scale.unwrap_or_else(|| scale_of(&errors));
     let mut canvas = Canvas::new(image.width, image.height, scale);
     for (i, error) in errors.iter().enumerate() {
         let (x, y) = (i % image.width, i / image.width);
@@ -51,7 +51,22 @@ pub fn error_map(image: &Picture, reference: &Picture, scale: Option<f64>) -> Er
     }
 }
 
-fn choose_scale(errors: &[f32]) -> f64 {
+/// The scale that [`error_map`] chooses for a picture of differences.
+pub(super) fn choose_scale(difference: &Picture) -> f64 {
+    let errors: Vec<f32> = difference.pixels.iter().map(|p| p.luminance()).collect();
+    scale_of(&errors)
+}
+
+/// The colours of [`error_map`] without its bar, as large as the pictures.
+pub(super) fn false_colours(image: &Picture, reference: &Picture, scale: f64) -> Picture {
+    let mut map = signed_difference(image, reference);
+    for p in &mut map.pixels {
+        *p = false_colour((f64::from(p.luminance()) / scale) as f32);
+    }
+    map
+}
+
+fn scale_of(errors: &[f32]) -> f64 {
     let mut sizes: Vec<f32> = errors.iter().map(|e| e.abs()).collect();
     sizes.sort_unstable_by(f32::total_cmp);
     let last = sizes.len().saturating_sub(1);
@@ -73,7 +88,7 @@ fn choose_scale(errors: &[f32]) -> f64 {
 
 /// Linear colour for an error of -1 (blue) over 0 (white) to 1 (red), on straight lines through OKLab
 /// (Ottosson 2020), where equal steps look equal.
-fn false_colour(error: f32) -> Rgb {
+pub(super) fn false_colour(error: f32) -> Rgb {
     let end = if error < 0.0 { NEGATIVE } else { POSITIVE };
     let t = error.abs().min(1.0);
     let [l, a, b] = std::array::from_fn(|c| WHITE[c] + t * (end[c] - WHITE[c]));
@@ -194,7 +209,7 @@ mod tests {
 
     #[test]
     fn scales_are_round_and_hold_the_errors() {
-        let scale = |v: f32| choose_scale(&[v; 10]);
+        let scale = |v: f32| scale_of(&[v; 10]);
         for (size, rounded) in [(0.1, 0.1), (0.11, 0.2), (3.0, 5.0), (5.1, 10.0), (0.0, 1.0)] {
             assert!((scale(size) / rounded - 1.0).abs() < 1e-6, "{size}");
             assert!((scale(-size) / rounded - 1.0).abs() < 1e-6, "{size}");

@@ -1,9 +1,22 @@
 //! How far a picture is from a reference: error metrics, a perceptual difference, a statistical test,
-//! and a picture of the error. Everything here works on two pictures; nothing knows how they were made.
+//! and a picture of the error. These work on two pictures and know nothing of how they were made.
+//!
+//! Above them, studies: [`plan`] says what is rendered how often, [`sweep`] does it, [`statistics`] tells bias
+//! from noise over the runs, [`fit`] draws lines through the errors, [`results`] and [`report`] write.
 
 pub mod error_map;
+pub mod evaluate;
+pub mod fit;
 pub mod flip;
+pub mod memory;
 pub mod metrics;
+pub mod plan;
+pub mod reference;
+pub mod report;
+pub mod results;
+pub mod runs;
+pub mod statistics;
+pub mod sweep;
 pub mod z_test;
 
 use std::fmt;

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::Seconds;
-use crate::cli::told::peak_memory;
 use crate::radiosity::{FormFactorMethod, Rgb64, Solution, SolveSpec, Solver};
+use crate::study::memory;
 
 /// Lines of a name and what is to be said of it.
 pub(super) fn table(spec: &SolveSpec, solution: &Solution, seconds: &Seconds) -> String {
@@ -173,6 +173,6 @@ pub(super) fn statistics(
             "snapshots": seconds.snapshots.as_secs_f64(),
             "write": seconds.write.as_secs_f64(),
         },
-        "peak_memory_bytes": peak_memory(),
+        "peak_memory_bytes": memory::peak(),
     })
 }

@@ -1,0 +1,171 @@
+use super::*;
+use crate::sampler::mix;
+
+/// Independent numbers of mean 0 and variance 1 (a sum of twelve uniform ones, Irwin-Hall).
+struct Noise(u64);
+
+impl Noise {
+    fn next(&mut self) -> f32 {
+        let mut sum = 0.0;
+        for _ in 0..12 {
+            self.0 += 1;
+            sum += (mix(self.0) >> 40) as f64 / (1u64 << 24) as f64;
+        }
+        (sum - 6.0) as f32
+    }
+
+    fn picture(&mut self, size: usize, mean: impl Fn(usize) -> f32, sd: f32) -> Picture {
+        let pixels = (0..size).map(|i| {
+            let mut channel = || mean(i) + sd * self.next();
+            Rgb::new(channel(), channel(), channel())
+        });
+        Picture {
+            width: size,
+            height: 1,
+            pixels: pixels.collect(),
+        }
+    }
+}
+
+const PIXELS: usize = 40;
+
+fn truth(i: usize) -> f32 {
+    0.5 + 0.01 * i as f32
+}
+
+/// A study of runs with known bias and noise, judged by a reference with noise of its own.
+fn moments(noise: &mut Noise, runs: usize, bias: f32, sd: f32, of_reference: f32) -> Moments {
+    let picture = noise.picture(PIXELS, truth, of_reference);
+    let variance = vec![Rgb::splat(of_reference * of_reference); PIXELS];
+    let reference = Reference {
+        picture,
+        variance: Some(variance),
+    };
+    // A bias of either sign.
+    let wrong = |i: usize| truth(i) + if i.is_multiple_of(2) { bias } else { -bias };
+    let pictures: Vec<Picture> = (0..runs)
+        .map(|_| noise.picture(PIXELS, wrong, sd))
+        .collect();
+    let gram = Gram::of(&pictures, &reference.picture, Weighing::Absolute);
+    let mean = mean_picture(&pictures);
+    Moments::of(&gram, &reference, &mean, Weighing::Absolute)
+}
+
+/// How often each interval (error, bias², variance) holds the truth, and the means of the figures.
+fn coverage(
+    studies: usize,
+    runs: usize,
+    bias: f32,
+    sd: f32,
+    of_reference: f32,
+) -> ([f64; 3], [f64; 3]) {
+    let mut noise = Noise(77);
+    let (bias2, variance) = (f64::from(bias).powi(2), f64::from(sd).powi(2));
+    let truth = [bias2 + variance, bias2, variance];
+    let (mut held, mut mean) = ([0.0; 3], [0.0; 3]);
+    for _ in 0..studies {
+        let m = moments(&mut noise, runs, bias, sd, of_reference);
+        for (k, e) in [m.mse, m.bias2, m.variance].iter().enumerate() {
+            held[k] += f64::from(u8::from(e.low <= truth[k] && truth[k] <= e.high));
+            mean[k] += e.value / studies as f64;
+        }
+    }
+    (held.map(|h| h / studies as f64), mean)
+}
+
+#[test]
+fn intervals_hold_the_truth() {
+    // Without bias, with some, with much; with an exact and with a noisy reference; with few runs and many.
+    for (runs, bias, sd, of_reference) in [
+        (8, 0.0, 0.1, 0.0),
+        (8, 0.0, 0.1, 0.03),
+        (8, 0.03, 0.1, 0.01),
+        (4, 0.1, 0.1, 0.0),
+        (4, 0.0, 0.1, 0.0),
+        (3, 0.05, 0.1, 0.0),
+        (24, 0.02, 0.1, 0.0),
+    ] {
+        let (held, mean) = coverage(400, runs, bias, sd, of_reference);
+        for (name, share) in ["error", "bias", "variance"].iter().zip(held) {
+            // 400 intervals of 95 %: standard deviation 1.1 %. More is allowed, as the reference's part is a
+            // bound and as Student's t of few runs is wide where pairs, which are more, decide.
+            assert!(
+                share >= 0.92,
+                "{runs} runs, bias {bias}, {of_reference}: {name} {share}"
+            );
+        }
+        // The figures themselves are not biased: their means over 400 studies, within 4 standard errors
+        // (one study of this many values knows a square of size s to about s sqrt(2 / values)).
+        let values = (runs * PIXELS * 3) as f64;
+        let size = f64::from(bias).powi(2) + f64::from(sd).powi(2);
+        let close = 4.0 * size * (6.0 / values).sqrt() / 20.0;
+        assert!(
+            (mean[1] - f64::from(bias).powi(2)).abs() < close,
+            "{mean:?}"
+        );
+        assert!((mean[2] - f64::from(sd).powi(2)).abs() < close, "{mean:?}");
+    }
+}
+
+#[test]
+fn intervals_are_not_wider_than_they_need_to_be() {
+    // Pairs of 8 runs know a bias² of 0 to sd² sqrt(2 / (56 * 120)); Student's t makes 2.36 of it.
+    let mut noise = Noise(5);
+    let widths: Vec<f64> = (0..200)
+        .map(|_| {
+            let m = moments(&mut noise, 8, 0.0, 0.1, 0.0);
+            (m.bias2.high - m.bias2.low) / 2.0
+        })
+        .collect();
+    let mean = widths.iter().sum::<f64>() / 200.0;
+    let expected = 2.36 * 0.01 * (2.0f64 / (56.0 * 120.0)).sqrt();
+    assert!(
+        (0.8..1.4).contains(&(mean / expected)),
+        "{}",
+        mean / expected
+    );
+}
+
+#[test]
+fn equal_pictures_have_no_error() {
+    let grey = Picture {
+        width: 4,
+        height: 1,
+        pixels: vec![Rgb::splat(0.25); 4],
+    };
+    let reference = Reference {
+        picture: grey.clone(),
+        variance: Some(vec![Rgb::BLACK; 4]),
+    };
+    let pictures = vec![grey; 5];
+    let gram = Gram::of(&pictures, &reference.picture, Weighing::Relative);
+    let m = Moments::of(
+        &gram,
+        &reference,
+        &mean_picture(&pictures),
+        Weighing::Relative,
+    );
+    let zero = Estimate::exact(0.0);
+    assert_eq!((m.mse, m.bias2, m.variance), (zero, zero, zero));
+    assert_eq!(brightness(&pictures, &reference), Some(zero));
+}
+
+#[test]
+fn slopes_have_honest_intervals() {
+    // Noise that falls by the root: 150 studies of 5 settings with 6 runs each.
+    let mut noise = Noise(1234);
+    let mut held = 0;
+    for _ in 0..150 {
+        let points: Vec<_> = (0..5)
+            .map(|k| {
+                let spp = f64::from(1 << k);
+                let m = moments(&mut noise, 6, 0.0, 0.2 / spp.sqrt() as f32, 0.0);
+                (spp, m.mse, 6)
+            })
+            .collect();
+        let slope = crate::study::fit::line(points.into_iter()).unwrap().slope;
+        held += u32::from(slope.low <= -0.5 && -0.5 <= slope.high);
+    }
+    // Binomial(150, 0.95): standard deviation 2.7; three of them below the mean.
+    assert!(held >= 134, "{held} of 150");
+}
