@@ -22,7 +22,7 @@ use crate::math::Rgb;
 use std::ops::Range;
 
 /// Side of a square tile, in pixels.
-pub const TILE: u32 = 16;
+pub const TILE: u32 = 8;
 
 /// The part of the full picture that is rendered, in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

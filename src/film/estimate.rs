@@ -63,10 +63,7 @@ impl Film {
 
     /// Degrees of freedom of a pixel's standard error.
     pub fn freedom(&self) -> u32 {
-        match self.range() {
-            Some(_) => self.replicates.saturating_sub(1),
-            None => self.replicates.saturating_sub(2),
-        }
+        self.replicates.saturating_sub(1)
     }
 
     /// The standard error of every pixel, row by row: the square root of the variance of its mean.
@@ -169,19 +166,7 @@ impl Tile {
         if !self.has_error() {
             return None;
         }
-        match self.taken {
-            super::Taken::Range(_) => Some(self.spread_over(i, c, 0, 1)),
-            // The mean of two independent means.
-            super::Taken::Halves(_) => {
-                let [a, b] = [0, 1].map(|half| self.spread_over(i, c, half, 2));
-                Some(Spread {
-                    mean: 0.5 * (a.mean + b.mean),
-                    variance: 0.25 * (a.variance + b.variance),
-                    variance_of_variance: (a.variance_of_variance + b.variance_of_variance) / 16.0,
-                    covariance: 0.125 * (a.covariance + b.covariance),
-                })
-            }
-        }
+        Some(self.spread_over(i, c, 0, 1))
     }
 
     /// By the replicates `first`, `first + step` and so on. A replicate of n_r of the n samples has the variance
@@ -197,7 +182,12 @@ impl Tile {
             n += n_of(i);
             sum += sums[i][c];
         }
-        let mean = sum.value() / n;
+        let mut mean = sum.value() / n;
+        if let (super::Taken::Halves([even, odd]), 1) = (&self.taken, step) {
+            // The mean of both halves' means: its variance is σ² (1/n_0 + 1/n_1) / 4.
+            mean = self.taken.mean(|i| sums[i][c], all);
+            n = 4.0 / (1.0 / *even as f64 + 1.0 / *odd as f64);
+        }
         let (mut second, mut third, mut fourth) = (0.0, 0.0, 0.0);
         for i in numbers() {
             let n_r = n_of(i);

@@ -16,9 +16,9 @@ use super::Target;
 use crate::film::{Film, Taken, Tile};
 
 /// Replicates: enough of each half to tell a tile's error, and few enough to leave quasi-random points at their best.
-pub const REPLICATES: u32 = 8;
+pub const REPLICATES: u32 = 4;
 /// Samples per pixel before the first look.
-const FIRST: u64 = 32;
+const FIRST: u64 = 64;
 /// By which samples of a tile may grow in a round: what little is known may be wrong.
 const GROWTH: f64 = 2.0;
 /// What is aimed at, as a share of the wanted relMSE: so that the upper end of its interval comes below it.
