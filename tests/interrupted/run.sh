@@ -16,7 +16,7 @@ fault() { echo "FAULT: $*"; faults=$((faults + 1)); }
 # Seconds of sleep from 0.05 to $1.
 moment() { awk -v r="$RANDOM" -v most="$1" 'BEGIN { print 0.05 + r / 32768 * (most - 0.05) }'; }
 
-for way in "path --spp 400" "vcm --spp 60" "sppm --spp 60" "combined --spp 60" "path --target-error 4%"; do
+for way in "path --spp 400" "vcm --spp 60" "sppm --spp 60" "combined --spp 60" "path --target-error 12%"; do
     # shellcheck disable=SC2086
     set -- --resolution 120x90 --integrator $way --progress never
     begin=$(date +%s.%N)
@@ -38,7 +38,7 @@ for way in "path --spp 400" "vcm --spp 60" "sppm --spp 60" "combined --spp 60" "
     "$luxel" render "$@" -o part.pfm --resume --checkpoint 50ms 2>part.log || fault "$way: $(cat part.log)"
     cmp -s whole.pfm part.pfm || fault "$way: the picture differs after $killed kills"
     [ -e part.checkpoint.exr ] && fault "$way: the checkpoint is left"
-    echo "$way: killed $killed times, a checkpoint was there $resumed times; the picture is the same"
+    echo "$way: killed $killed times, a checkpoint was there $resumed times"
 done
 
 # A folder that takes nothing, and one that is full: where the system lets us make them.
