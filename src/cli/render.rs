@@ -288,9 +288,6 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
 
     let write_start = Instant::now();
     let interrupted = stopped.load(Ordering::Relaxed);
-    if interrupted {
-        checkpoints.write(&film, &stats)?;
-    }
     let image = match work.shard {
         None => job.picture(&film, &stats, &metadata),
         Some(_) => rendering.image(&film, &stats)?,
@@ -325,18 +322,19 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
     told::warn_of_target(job, stop, &film);
     eprintln!("{}", told::summary(&film, &stats, &outputs));
     told::report_invalid(&stats);
+    // A picture that was interrupted, or ran out of time, may be gone on with. It is written already: what fails
+    // now loses nothing.
+    let is_late = |target: &Target| !job.is_good_enough(&film, target);
+    match interrupted || args.target_error.as_ref().is_some_and(is_late) {
+        true => {
+            let warning = checkpoints.keep(&film, &stats);
+            warning.iter().for_each(|w| progress.warn(w));
+        }
+        false => checkpoints.remove(),
+    }
     Ok(match interrupted {
         true => Outcome::Interrupted,
-        false => {
-            // A picture that ran out of time may be gone on with.
-            match args.target_error {
-                Some(target) if !job.is_good_enough(&film, &target) => {
-                    checkpoints.write(&film, &stats)?;
-                }
-                _ => checkpoints.remove(),
-            }
-            Outcome::Done
-        }
+        false => Outcome::Done,
     })
 }
 

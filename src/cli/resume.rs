@@ -120,6 +120,13 @@ impl<'a> Checkpoints<'a> {
         Ok((saved.film, saved.stats))
     }
 
+    /// Writes the last one, unless none are wanted: gives a warning if that fails.
+    pub fn keep(&mut self, film: &Film, stats: &Stats) -> Option<String> {
+        self.interval?;
+        let failure = self.write(film, stats).err()?;
+        Some(format!("{failure}; there is no checkpoint to go on from"))
+    }
+
     /// Writes one if it is time to: gives a warning if that fails, once.
     pub fn update(&mut self, film: &Film, stats: &Stats) -> Option<String> {
         /// Share of the time that writing may take.

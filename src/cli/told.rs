@@ -202,7 +202,7 @@ pub(super) fn warn_of_target(job: &Job, stop: Stop, film: &Film) {
         && !job.is_good_enough(film, &target)
     {
         eprintln!(
-            "warning: the picture is not as good as the {} that was asked for: go on by --resume with more time",
+            "warning: the picture is not as good as the {} that was asked for: go on by --resume",
             shown_target(&target)
         );
     }

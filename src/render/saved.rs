@@ -8,7 +8,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::{Job, Metadata, Recipe, Shard, Stats, Stop, Target, Work};
+use super::{Job, Metadata, Recipe, Shard, Stats, Stop, Work};
 use crate::film::{Film, Planes, Taken, Window};
 use crate::image_io::{Channel, Image, Layer, Samples};
 
@@ -88,7 +88,6 @@ pub struct Saved {
     pub shard: Option<Shard>,
     /// Samples per pixel of the whole picture, where they are known.
     pub planned: Option<u64>,
-    pub target: Option<Target>,
     pub film: Film,
     pub stats: Stats,
 }
@@ -102,7 +101,6 @@ struct Head {
     metadata: Metadata,
     shard: Option<Shard>,
     planned: Option<u64>,
-    target: Option<Target>,
     window: [u32; 4],
     replicates: u32,
     aov_channels: usize,
@@ -132,10 +130,6 @@ impl Job {
             metadata: metadata.clone(),
             shard: work.shard,
             planned: work.stop.spp(),
-            target: match work.stop {
-                Stop::Error { target, .. } => Some(target),
-                _ => None,
-            },
             window: [window.x, window.y, window.width, window.height],
             replicates: film.replicates(),
             aov_channels: self.aovs.iter().map(|l| l.aov.channels().len()).sum(),
@@ -218,7 +212,6 @@ impl Saved {
             metadata: head.metadata,
             shard: head.shard,
             planned: head.planned,
-            target: head.target,
             film,
             stats: head.stats,
         })
