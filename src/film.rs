@@ -5,6 +5,7 @@
 mod estimate;
 mod exact;
 mod filter;
+mod glance;
 mod parts;
 mod planes;
 mod splat;
@@ -13,6 +14,7 @@ mod taken;
 pub use estimate::{ErrorEstimate, TileError, student_t_95};
 pub use exact::Sum;
 pub use filter::{Filter, FilterSampler};
+pub use glance::{FEWEST, Glance};
 pub use parts::PartMoments;
 pub use planes::{PlaneError, Planes};
 pub use splat::{Splat, SplatBand, SplatBuffer};

@@ -1,6 +1,7 @@
 //! The command line. It turns arguments into edits of a job, shows progress and writes files; it decides
 //! nothing about rendering. Only this module and `main` print.
 
+mod choosing;
 pub mod compare;
 mod info;
 mod merge;

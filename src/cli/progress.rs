@@ -61,6 +61,16 @@ impl Progress {
         }
     }
 
+    /// That an integrator is tried before one is chosen.
+    pub fn trying(&mut self, options: &str, film: &Film, stats: &Stats) {
+        if let Progress::Bar(bar) = self {
+            bar.set_message(match stats.solving {
+                Some(_) => format!("trying {options}: solving for radiosity"),
+                None => format!("trying {options}: {} spp", film.spp()),
+            });
+        }
+    }
+
     /// Prints a warning, above the bar if there is one.
     pub fn warn(&self, warning: &str) {
         let print = || eprintln!("warning: {warning}");

@@ -12,9 +12,9 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use super::numbers::whole;
 use super::preview::{self, Viewer};
 use super::progress::{Progress, ProgressMode};
-use super::resume::{Checkpoints, Interval, Rendering, parse_interval};
+use super::resume::{self, Checkpoints, Interval, Rendering, parse_interval};
 use super::told::{self, Seconds};
-use super::{Failure, Outcome};
+use super::{Failure, Outcome, choosing};
 use crate::film::Window;
 use crate::format::{self, Overrides};
 use crate::image_io::{self, Image};
@@ -28,7 +28,8 @@ pub struct RenderArgs {
     /// [default: SCENE.exr and SCENE.png in the current folder]
     #[arg(short, long = "output", value_name = "FILE")]
     pub output: Vec<PathBuf>,
-    /// Use this integrator in place of the scene's
+    /// Use this integrator in place of the scene's; auto tries those that find all light of the scene, and takes the
+    /// most efficient one
     #[arg(long, value_name = "NAME")]
     pub integrator: Option<String>,
     /// How a path tracer finds light between diffuse surfaces: none (by itself), gather (read from radiosity,
@@ -218,7 +219,7 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
         aovs: args.aov.clone(),
         seed: args.seed,
     };
-    let compiled = pool.install(|| format::compile(&desc, &overrides))?;
+    let mut compiled = pool.install(|| format::compile(&desc, &overrides))?;
     let build = start.elapsed() - load;
     for warning in &compiled.warnings {
         eprintln!("warning: {warning}");
@@ -238,10 +239,14 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
         );
         return Err(Failure::Usage(what));
     }
+    if compiled.choice.is_some() && args.shard.is_some() {
+        let what = "--integrator auto: each shard would choose for itself: choose by a render without --shard, and give \
+                    all shards the integrator that it names";
+        return Err(Failure::Usage(what.to_string()));
+    }
     args.stats
         .iter()
         .try_for_each(|path| image_io::check_writable(path))?;
-    let job = &compiled.job;
     let work = Work {
         stop: match (args.target_error, args.spp, args.time) {
             (Some(target), _, within) => Stop::Error { target, within },
@@ -253,20 +258,35 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
     };
     let stop = work.stop;
     let name = scene_name(args.scene.as_deref());
-    let preview = viewer.map(|v| v.open(&name, job.film.crop));
+    let preview = viewer.map(|v| v.open(&name, compiled.job.film.crop));
     let mut preview = preview.transpose()?;
     let metadata = Metadata {
         scene: name,
         scene_hash: compiled.hash.clone(),
         command_line: command_line.to_string(),
     };
+    let mut progress = Progress::new(args.progress);
+    let is_stopped = || stopped.load(Ordering::Relaxed);
+    let mut choice = None;
+    let mut begun = None;
+    if let Some(candidates) = compiled.choice.take() {
+        let job = &mut compiled.job;
+        let checkpoint = resume::beside(&outputs[0]);
+        if !(args.resume && choosing::goes_on(job, &candidates, &checkpoint, &work, &desc)?) {
+            let chosen = pool
+                .install(|| choosing::choose(job, candidates, &work, &mut progress, is_stopped));
+            let (chosen, film, stats) = chosen?;
+            (choice, begun) = (Some(chosen), Some((film, stats)));
+        }
+    }
+    let job = &compiled.job;
     let rendering = Rendering::new(job, work, &desc, &metadata);
     let mut checkpoints = Checkpoints::new(&outputs[0], args.checkpoint.0, &rendering);
-    let (film, stats) = match args.resume {
-        true => checkpoints.resume()?,
-        false => (job.film_for(&work), Stats::default()),
+    let (film, stats) = match begun {
+        Some(begun) => begun,
+        None if args.resume => checkpoints.resume()?,
+        None => (job.film_for(&work), Stats::default()),
     };
-    let mut progress = Progress::new(args.progress);
     let rendered = pool.install(|| {
         job.go_on(&work, film, stats, |film, stats| {
             progress.update(film, stats, stop);
@@ -274,7 +294,7 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
             warning.iter().for_each(|w| progress.warn(w));
             let warning = preview.as_mut().and_then(|p| p.update(film));
             warning.iter().for_each(|w| progress.warn(w));
-            match stopped.load(Ordering::Relaxed) {
+            match is_stopped() {
                 true => ControlFlow::Break(()),
                 false => ControlFlow::Continue(()),
             }
@@ -287,7 +307,7 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
     let threads = pool.current_num_threads();
 
     let write_start = Instant::now();
-    let interrupted = stopped.load(Ordering::Relaxed);
+    let interrupted = is_stopped();
     let image = match work.shard {
         None => job.picture(&film, &stats, &metadata),
         Some(_) => rendering.image(&film, &stats)?,
@@ -309,10 +329,11 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
         write: write_start.elapsed(),
     };
     if let Some(path) = &args.stats {
-        let text = format!(
-            "{:#}\n",
-            told::statistics(job, &film, &stats, &metadata, &seconds, threads)
-        );
+        let mut told = told::statistics(job, &film, &stats, &metadata, &seconds, threads);
+        if let Some(choice) = &choice {
+            told["auto"] = choice.to_json();
+        }
+        let text = format!("{told:#}\n");
         image_io::write_atomic(path, text.as_bytes())?;
     }
     // Only now that all is written: the viewer may keep it waiting.

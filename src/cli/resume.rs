@@ -25,6 +25,11 @@ pub fn parse_interval(text: &str) -> Result<Interval, String> {
     }
 }
 
+/// Where the checkpoint of a render that writes `output` is.
+pub fn beside(output: &Path) -> PathBuf {
+    output.with_extension("checkpoint.exr")
+}
+
 /// What is rendered.
 pub struct Rendering<'a> {
     pub job: &'a Job,
@@ -86,7 +91,7 @@ impl<'a> Checkpoints<'a> {
         of: &'a Rendering<'a>,
     ) -> Checkpoints<'a> {
         Checkpoints {
-            path: output.with_extension("checkpoint.exr"),
+            path: beside(output),
             interval,
             of,
             last: Instant::now(),

@@ -1,6 +1,7 @@
 //! Rendering: passes over the film, when to stop, and what it cost.
 
 mod adaptive;
+mod choice;
 mod pass;
 mod picture;
 mod saved;
@@ -9,6 +10,7 @@ mod stats;
 mod stop;
 mod techniques;
 
+pub use choice::{Choice, Measured, Trial};
 pub use picture::{ComponentFormat, Metadata, PixelFormat, Recipe};
 pub use saved::{Identity, Saved, merge};
 pub use stats::{Invalid, Phases, SolvingStep, Stats};
@@ -57,12 +59,22 @@ pub struct Job {
 pub enum RenderError {
     /// Radiosity is asked for, and the scene has none.
     Radiosity(SolveError),
+    /// An integrator is to be chosen, and none of those that were to be tried can render the scene.
+    NoChoice(Choice),
 }
 
 impl fmt::Display for RenderError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             RenderError::Radiosity(why) => write!(f, "cannot solve for radiosity: {why}"),
+            RenderError::NoChoice(choice) => {
+                write!(f, "no integrator that may be chosen can render the scene")?;
+                let failed = choice.trials.iter();
+                let failed = failed.filter_map(|t| Some((t.options, t.found.as_ref().err()?)));
+                failed
+                    .into_iter()
+                    .try_for_each(|(options, why)| write!(f, "; {options}: {why}"))
+            }
         }
     }
 }
@@ -126,14 +138,29 @@ impl Job {
     pub fn go_on(
         &self,
         work: &Work,
+        film: Film,
+        mut stats: Stats,
+        on_pass: impl FnMut(&Film, &Stats) -> ControlFlow<()>,
+    ) -> Result<(Film, Stats), RenderError> {
+        let start = Instant::now();
+        let transport = self.transport(film.replicates(), work.stop.spp());
+        let setup = start.elapsed().as_secs_f64();
+        stats.phases.setup += setup;
+        stats.seconds += setup;
+        self.go_on_by(&transport, work, film, stats, on_pass)
+    }
+
+    /// The same by an integrator that is ready.
+    fn go_on_by(
+        &self,
+        transport: &Transport,
+        work: &Work,
         mut film: Film,
         mut stats: Stats,
         mut on_pass: impl FnMut(&Film, &Stats) -> ControlFlow<()>,
     ) -> Result<(Film, Stats), RenderError> {
         let start = Instant::now();
         let before = stats.seconds;
-        let transport = self.transport(film.replicates(), work.stop.spp());
-        stats.phases.setup += start.elapsed().as_secs_f64();
         let solved = transport.prepare(&mut |progress| {
             stats.seconds = before + start.elapsed().as_secs_f64();
             stats.solving = Some(SolvingStep {
@@ -159,7 +186,7 @@ impl Job {
             };
             let begun = Instant::now();
             let done = film.samples();
-            let pass = self.add_pass(&transport, &mut film, &samples);
+            let pass = self.add_pass(transport, &mut film, &samples);
             clock.count(film.samples() - done, begun.elapsed());
             stats.add(pass);
             stats.seconds = before + start.elapsed().as_secs_f64();

@@ -72,12 +72,15 @@ pub struct Phases {
     pub samples: f64,
     /// Bringing light to the pixels where it arrives.
     pub splats: f64,
+    /// Trying integrators that were not chosen.
+    #[serde(default)]
+    pub trials: f64,
 }
 
 impl Phases {
     /// What went before the samples.
     pub fn precompute(&self) -> f64 {
-        self.setup + self.radiosity + self.photons + self.map
+        self.setup + self.radiosity + self.photons + self.map + self.trials
     }
 }
 
@@ -100,6 +103,7 @@ impl Stats {
         sum.map += more.map;
         sum.samples += more.samples;
         sum.splats += more.splats;
+        sum.trials += more.trials;
         self.radius = match (self.radius, later.radius) {
             (Some([first, _]), Some([_, last])) => Some([first, last]),
             (a, b) => a.or(b),

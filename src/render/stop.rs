@@ -76,7 +76,7 @@ impl Work {
         Some(self.shard.map_or(0..spp, |shard| shard.range(spp)))
     }
 
-    fn limit(&self) -> Option<Duration> {
+    pub(super) fn limit(&self) -> Option<Duration> {
         match self.stop {
             Stop::Spp(_) => None,
             Stop::Time(limit) => Some(limit),

@@ -4,6 +4,7 @@
 
 pub mod aov;
 mod bidir;
+pub mod candidates;
 mod combined;
 mod ledger;
 pub mod light_walk;
@@ -151,6 +152,17 @@ impl IntegratorSpec {
         }
     }
 
+    /// A solution for radiosity to use in place of one of its own; other estimators stay as they are.
+    pub fn with_solution(mut self, solution: Option<Solved>) -> IntegratorSpec {
+        match &mut self {
+            IntegratorSpec::Combined(spec) => spec.cache.given = solution,
+            IntegratorSpec::Cached(spec) => spec.cache.given = solution,
+            IntegratorSpec::Radiosity(spec) => spec.given = solution,
+            _ => {}
+        }
+        self
+    }
+
     /// What the estimator decides on in `scene`, for the plan.
     pub fn plan(&self, scene: &Scene) -> Vec<PlanEntry> {
         match self {
@@ -289,6 +301,11 @@ impl<'a> Transport<'a> {
     /// What the solution is known to be; `None` where there is none.
     pub fn solution_report(&self) -> Option<&Report> {
         self.solving()?.report()
+    }
+
+    /// The solution itself, to be given to another integrator.
+    pub fn solution(&self) -> Option<Solved> {
+        self.solving()?.solution()
     }
 
     fn solving(&self) -> Option<&radiosity::Solving<'a>> {

@@ -96,6 +96,10 @@ fn build(args: &StudyArgs, variant: &Variant) -> Result<Built, Failure> {
         ..Overrides::default()
     };
     let compiled = format::compile(&desc, &overrides)?;
+    if compiled.choice.is_some() {
+        let what = "integrators of a study are named: auto may take another one in each run";
+        return Err(Failure::Usage(what.to_string()));
+    }
     let content = desc
         .content_hash()
         .map_err(|e| Failure::Input(format!("cannot read a file that the scene names: {e}")))?;

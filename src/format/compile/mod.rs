@@ -18,13 +18,14 @@ use crate::math::DVec3;
 use crate::render::{AovLayer, Job};
 use crate::scene::{Plan, Scene};
 use crate::transport::aov::Aov;
+use crate::transport::candidates::{self, Candidate};
 use materials::Materials;
 use world::Layout;
 
 /// What the command line asks for in place of what the scene says.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Overrides {
-    /// Name of an integrator.
+    /// Name of an integrator, or `auto`.
     pub integrator: Option<String>,
     /// What a path tracer makes of light between diffuse surfaces: `none`, `gather`, `guide`.
     pub indirect: Option<String>,
@@ -44,6 +45,8 @@ pub struct Overrides {
 #[derive(Debug)]
 pub struct Compiled {
     pub job: Job,
+    /// Integrators that one is to be chosen from by [`Job::choose`], if the command line leaves that open.
+    pub choice: Option<Vec<Candidate>>,
     /// Samples per pixel that the scene asks for.
     pub spp: u64,
     /// What the user should know although it is no error.
@@ -100,8 +103,13 @@ pub fn compile(desc: &SceneDesc, overrides: &Overrides) -> Result<Compiled, Scen
     let materials = materials.finish(&mut plan, &mut warnings);
     desc.check_all_read()?;
     let mut scene = Scene::with_world(world, surfaces, materials, lights, center, plan);
-    for entry in integrator.plan(&scene) {
-        scene.decide(entry);
+    let choice = integrator::candidates(&integrator, &scene, overrides);
+    match &choice {
+        Some(candidates) => scene.decide(candidates::plan(candidates)),
+        None => integrator
+            .plan(&scene)
+            .into_iter()
+            .for_each(|entry| scene.decide(entry)),
     }
     let job = Job {
         scene,
@@ -114,9 +122,12 @@ pub fn compile(desc: &SceneDesc, overrides: &Overrides) -> Result<Compiled, Scen
         pixel_format: film.pixel_format,
         component_format: film.component_format,
     };
-    integrator::check_memory(&job, &root, overrides)?;
+    if choice.is_none() {
+        integrator::check_memory(&job, &root, overrides)?;
+    }
     Ok(Compiled {
         job,
+        choice,
         spp: sampler.spp,
         warnings,
         hash: desc.hash(),

@@ -245,6 +245,11 @@ impl<'a> Solving<'a> {
         self.made.get()?.as_ref().ok()?.as_ref()
     }
 
+    /// The solution itself, once it is made.
+    pub fn solution(&self) -> Option<Solved> {
+        self.get().map(|cache| Solved(Arc::clone(&cache.solution)))
+    }
+
     /// What the solution is known to be.
     pub fn report(&self) -> Option<&Report> {
         self.get().map(|cache| &cache.solution.report)

@@ -12,13 +12,18 @@ use super::{on_command_line, suggest};
 use crate::format::plugins::Category;
 use crate::format::{Overrides, Props, SceneError};
 use crate::render::AovLayer;
+use crate::scene::Scene;
 use crate::transport::aov::Aov;
+use crate::transport::candidates::{self, Candidate};
 use crate::transport::radiosity::Indirect;
 use crate::transport::{
     CacheSpec, CombinedSpec, DirectSpec, IntegratorSpec, PathSpec, PhotonMapperSpec, RadiositySpec,
 };
 
-const NAMES: [&str; 9] = [
+/// In place of a name: the most efficient one is to be found out.
+const AUTO: &str = "auto";
+const NAMES: [&str; 10] = [
+    AUTO,
     "path",
     "direct",
     "bdpt",
@@ -45,6 +50,10 @@ pub fn integrator(
         Some(name) => replaced(spec, name)?,
         None => spec,
     };
+    if let (Some(AUTO), Some(way)) = (overrides.integrator.as_deref(), &overrides.indirect) {
+        let what = "--integrator auto finds out by itself whether radiosity helps".to_string();
+        return Err(on_command_line("--indirect", way, what).with_help("leave one of them out"));
+    }
     spec = radiosity::overridden(spec, indirect)?;
     if let Some(depth) = overrides.max_depth {
         let name = spec.name();
@@ -153,6 +162,20 @@ fn direct(props: &Props, hide_emitters: bool) -> Result<IntegratorSpec, SceneErr
 /// Most samples per hit of the direct integrator.
 const MAX_SPLIT: u32 = 1 << 16;
 
+/// What `--integrator auto` is to choose from; `None` where the integrator is known.
+pub fn candidates(
+    spec: &IntegratorSpec,
+    scene: &Scene,
+    overrides: &Overrides,
+) -> Option<Vec<Candidate>> {
+    match (spec, overrides.integrator.as_deref()) {
+        (IntegratorSpec::Combined(shared), Some(AUTO)) => {
+            Some(candidates::candidates(shared, scene))
+        }
+        _ => None,
+    }
+}
+
 /// The integrator `name` with the settings it shares with `spec`.
 fn replaced(mut spec: IntegratorSpec, name: &str) -> Result<IntegratorSpec, SceneError> {
     if name == spec.name() {
@@ -160,7 +183,8 @@ fn replaced(mut spec: IntegratorSpec, name: &str) -> Result<IntegratorSpec, Scen
     }
     let mut new = match name {
         "path" => IntegratorSpec::Path(PathSpec::default()),
-        "combined" => IntegratorSpec::Combined(CombinedSpec::default()),
+        // It has the settings of all that may be chosen.
+        "combined" | AUTO => IntegratorSpec::Combined(CombinedSpec::default()),
         "photonmapper" => IntegratorSpec::PhotonMapper(PhotonMapperSpec::default()),
         "radiosity" => IntegratorSpec::Radiosity(RadiositySpec::default()),
         "direct" => IntegratorSpec::Direct(DirectSpec {

@@ -1,0 +1,368 @@
+//! Which integrator suits a scene best: found out by trying those that may.
+//!
+//! Each takes a few samples of the whole picture. An integrator is worth 1 / (v s), v the squared error of one sample of
+//! each pixel relative to the picture, and s the seconds that it takes; what has to be prepared first is counted beside
+//! it. The one that is through first is chosen, and goes on from the samples that it has taken: the picture is the same
+//! as if it had been asked for by name.
+//!
+//! Two things that the spread of few samples does not show are looked at. Light that hardly any sample finds: where
+//! another integrator finds significantly more of it than n samples do, so much is missing from them. How rarely they find
+//! it is not known: it may come with the next sample, or never, so the squared error δ² that its absence makes is taken to
+//! fall as √(n / N) up to sample N, which is between both. And bias, where photons are merged: it falls more slowly than
+//! noise, so such an integrator must be twice as good to be chosen.
+
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+use serde_json::{Value, json};
+
+use super::{Job, RenderError, Stats, Stop, Work};
+use crate::film::{FEWEST, Film, Glance};
+use crate::transport::IntegratorSpec;
+use crate::transport::candidates::Candidate;
+
+/// Share of the time of the whole picture that a trial takes, unless that is too little to see anything; and that it may
+/// take at most, beyond so many seconds.
+const SHARE: f64 = 0.02;
+const MOST: f64 = 0.1;
+const SHORT: f64 = 0.5;
+/// Samples of each pixel that say enough.
+const ENOUGH: f64 = 16.0;
+/// How much better one with a bias that vanishes must be than one without.
+const MARGIN: f64 = 2.0;
+/// Standard errors by which the means of two integrators differ when one of them misses light.
+const SIGNIFICANT: f64 = 3.0;
+/// What is added to a squared mean that an error is relative to.
+const FLOOR: f64 = 0.01;
+
+/// What became of an integrator.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trial {
+    /// Options of the command line that ask for it.
+    pub options: &'static str,
+    /// Whether it is biased, however little.
+    pub biased: bool,
+    /// What was found, or why it was not tried.
+    pub found: Result<Measured, String>,
+}
+
+/// What a trial found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measured {
+    /// Samples of each pixel.
+    pub samples: f64,
+    /// relMSE of a picture of one sample per pixel, by the spread of the samples.
+    pub relmse: f64,
+    /// relMSE that light makes which others found and this one did not.
+    pub missed: f64,
+    /// Seconds for one sample of each pixel.
+    pub seconds: f64,
+    /// Seconds for what is prepared before.
+    pub prepared: f64,
+    /// Seconds until the picture is as good as is asked for; where a number of samples or a time is, as good as the best
+    /// of all would be then.
+    pub whole: f64,
+}
+
+impl Measured {
+    /// 1 / (relMSE × seconds) of what samples show; infinite where there is no error.
+    pub fn efficiency(&self) -> f64 {
+        1.0 / (self.relmse * self.seconds)
+    }
+
+    /// relMSE after so many samples.
+    fn after(&self, samples: f64) -> f64 {
+        self.relmse / samples + self.missed * (self.samples / samples).sqrt().min(1.0)
+    }
+
+    /// Samples until that relMSE; one, where there is no error.
+    fn until(&self, wanted: f64) -> f64 {
+        // With x = 1/√N: relmse x² + missed √n x = wanted.
+        let half = 0.5 * self.missed * self.samples.sqrt();
+        let x = wanted / (half + (half * half + self.relmse * wanted).sqrt());
+        match x > 0.0 {
+            true => (1.0 / (x * x)).max(1.0),
+            false => 1.0,
+        }
+    }
+}
+
+/// Which integrator was chosen, and why.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Choice {
+    pub trials: Vec<Trial>,
+    /// Number of the one that was chosen.
+    pub chosen: usize,
+}
+
+impl Choice {
+    pub fn options(&self) -> &'static str {
+        self.trials[self.chosen].options
+    }
+
+    pub fn to_json(&self) -> Value {
+        let of = |trial: &Trial| match &trial.found {
+            Ok(m) => json!({
+                "options": trial.options,
+                "biased": trial.biased,
+                "samples": m.samples,
+                "relmse_of_one_sample": m.relmse,
+                "relmse_of_missed_light": m.missed,
+                "seconds_per_sample": m.seconds,
+                "seconds_to_prepare": m.prepared,
+                "efficiency": m.efficiency(),
+                "seconds_to_be_as_good": m.whole,
+            }),
+            Err(why) => {
+                json!({ "options": trial.options, "biased": trial.biased, "not_tried": why })
+            }
+        };
+        json!({
+            "chosen": self.options(),
+            "trials": self.trials.iter().map(of).collect::<Vec<_>>(),
+        })
+    }
+}
+
+/// What was rendered on trial.
+struct Flown {
+    spec: IntegratorSpec,
+    film: Film,
+    stats: Stats,
+    glance: Option<Vec<Glance>>,
+}
+
+impl Flown {
+    /// Of each pixel.
+    fn samples(&self) -> f64 {
+        self.film.samples() as f64 / pixels(&self.film)
+    }
+
+    fn prepared(&self) -> f64 {
+        self.stats.phases.setup + self.stats.phases.radiosity
+    }
+
+    /// For one sample of each pixel.
+    fn seconds(&self) -> f64 {
+        (self.stats.seconds - self.prepared()).max(0.0) / self.samples().max(1.0)
+    }
+
+    /// relMSE of one sample, by its own means.
+    fn relmse(&self) -> Option<f64> {
+        let glance = self.glance.as_ref()?;
+        Some(mean_over(glance, |g| {
+            g.of_sample / (g.mean * g.mean + FLOOR)
+        }))
+    }
+
+    /// Seconds for the picture that `work` asks for.
+    fn whole(&self, work: &Work) -> Option<f64> {
+        let wanted = match work.stop {
+            Stop::Spp(n) => return Some(self.prepared() + self.seconds() * n as f64),
+            Stop::Time(limit) => return Some(limit.as_secs_f64()),
+            Stop::Error { target, .. } => target.error * target.error,
+        };
+        let seconds = self.prepared() + self.seconds() * self.relmse()? / wanted;
+        let within = work
+            .limit()
+            .map_or(f64::INFINITY, |limit| limit.as_secs_f64());
+        Some(seconds.min(within))
+    }
+}
+
+fn pixels(film: &Film) -> f64 {
+    f64::from(film.window().width) * f64::from(film.window().height)
+}
+
+/// Mean over the pixels of all tiles.
+fn mean_over(glance: &[Glance], value: impl Fn(&Glance) -> f64) -> f64 {
+    let pixels: f64 = glance.iter().map(|g| g.pixels).sum();
+    glance.iter().map(|g| g.pixels * value(g)).sum::<f64>() / pixels.max(1.0)
+}
+
+impl Job {
+    /// Tries `candidates`, and makes the best of them the job's integrator. What it has rendered of `work` on trial is
+    /// to be gone on with by [`Job::go_on`]. `on_pass` sees every pass of every trial, with the options that ask for
+    /// what is tried; if it breaks, the choice is made of what is known by then.
+    ///
+    /// # Errors
+    /// None of them can render the scene.
+    pub fn choose(
+        &mut self,
+        candidates: Vec<Candidate>,
+        work: &Work,
+        mut on_pass: impl FnMut(&str, &Film, &Stats) -> ControlFlow<()>,
+    ) -> Result<(Choice, Film, Stats), RenderError> {
+        let start = Instant::now();
+        let mut stopped = false;
+        let mut whole = None;
+        let mut trials: Vec<Trial> = Vec::new();
+        let mut flown: Vec<Option<Flown>> = Vec::new();
+        for Candidate { options, spec } in candidates {
+            let outcome = match spec {
+                Err(why) => Err(why.to_string()),
+                Ok(_) if stopped => Err("it was stopped before".to_string()),
+                Ok(spec) => {
+                    self.integrator = spec;
+                    self.fly(work, whole, |film, stats| {
+                        let flow = on_pass(options, film, stats);
+                        stopped |= flow.is_break();
+                        flow
+                    })
+                }
+            };
+            if let Ok(flown) = &outcome {
+                whole = whole.or_else(|| flown.whole(work));
+            }
+            trials.push(Trial {
+                options,
+                biased: outcome.as_ref().is_ok_and(|f| f.spec.biased()),
+                found: Err(outcome.as_ref().err().cloned().unwrap_or_default()),
+            });
+            flown.push(outcome.ok());
+        }
+        judge(&mut trials, &flown, work);
+        let Some(chosen) = best(&trials, &flown) else {
+            return Err(RenderError::NoChoice(Choice { trials, chosen: 0 }));
+        };
+        let choice = Choice { trials, chosen };
+        let Some(winner) = flown.swap_remove(chosen) else {
+            return Err(RenderError::NoChoice(choice));
+        };
+        self.integrator = winner.spec;
+        for entry in self.integrator.plan(&self.scene) {
+            self.scene.decide(entry);
+        }
+        let mut stats = winner.stats;
+        let all = start.elapsed().as_secs_f64();
+        stats.phases.trials = (all - stats.seconds).max(0.0);
+        stats.seconds = stats.seconds.max(all);
+        Ok((choice, winner.film, stats))
+    }
+
+    /// Tries the job's integrator for as long as a trial may take in a picture of `whole` seconds, if that is known: then
+    /// the first trial is over. Why it is given up, if it is.
+    fn fly(
+        &self,
+        work: &Work,
+        whole: Option<f64>,
+        mut on_pass: impl FnMut(&Film, &Stats) -> ControlFlow<()>,
+    ) -> Result<Flown, String> {
+        let film = self.film_for(work);
+        let start = Instant::now();
+        let transport = self.transport(film.replicates(), work.stop.spp());
+        transport.fits()?;
+        let mut stats = Stats::default();
+        stats.phases.setup = start.elapsed().as_secs_f64();
+        stats.seconds = stats.phases.setup;
+        let share = SHARE * whole.unwrap_or(0.0);
+        let most = (MOST * whole.unwrap_or(0.0)).max(SHORT);
+        let needed = f64::from(film.replicates().min(FEWEST));
+        let mut given_up = None;
+        let pass = |film: &Film, stats: &Stats| {
+            let flow = on_pass(film, stats);
+            let taken = film.samples() as f64 / pixels(film);
+            // The first may take as long as it needs: something has to be known.
+            let expected = stats.phases.radiosity
+                + (stats.seconds - stats.phases.radiosity) * needed / taken.max(1.0);
+            given_up = match (whole, &stats.solving) {
+                (Some(_), Some(_)) if stats.seconds > most => {
+                    Some("solving for radiosity takes too long for such a picture".to_string())
+                }
+                (Some(_), None) if taken < needed && expected > most => Some(format!(
+                    "{needed} samples would take {expected:.1} s, too long for such a picture"
+                )),
+                _ => None,
+            };
+            let enough = taken >= needed && (stats.seconds >= share.max(SHORT) || taken >= ENOUGH);
+            match given_up.is_some() || enough {
+                true => ControlFlow::Break(()),
+                false => flow,
+            }
+        };
+        let gone = self.go_on_by(&transport, work, film, stats, pass);
+        let (film, stats) = gone.map_err(|e| e.to_string())?;
+        if let Some(why) = given_up {
+            return Err(why);
+        }
+        let solution = transport.solution();
+        if matches!(self.integrator, IntegratorSpec::Cached(_)) && solution.is_none() {
+            return Err("radiosity would not be worth its while".to_string());
+        }
+        Ok(Flown {
+            spec: self.integrator.clone().with_solution(solution),
+            glance: film.glance(),
+            film,
+            stats,
+        })
+    }
+}
+
+/// Fills in what was found.
+fn judge(trials: &mut [Trial], flown: &[Option<Flown>], work: &Work) {
+    let seen: Vec<&[Glance]> = (flown.iter().flatten())
+        .filter_map(|f| f.glance.as_deref())
+        .collect();
+    let Some(tiles) = seen.first().map(|s| s.len()) else {
+        return;
+    };
+    // What all errors are relative to.
+    let mean = |i: usize| seen.iter().map(|s| s[i].mean).sum::<f64>() / seen.len() as f64;
+    let scale: Vec<f64> = (0..tiles)
+        .map(|i| 1.0 / (mean(i).powi(2) + FLOOR))
+        .collect();
+    let weighted = |glance: &[Glance], value: &dyn Fn(usize) -> f64| {
+        let all: f64 = glance.iter().map(|g| g.pixels).sum();
+        let sum: f64 = (0..tiles)
+            .map(|i| glance[i].pixels * scale[i] * value(i))
+            .sum();
+        sum / all.max(1.0)
+    };
+    for (trial, flown) in trials.iter_mut().zip(flown) {
+        let Some((flown, glance)) = flown.as_ref().and_then(|f| Some((f, f.glance.as_ref()?)))
+        else {
+            continue;
+        };
+        let missing = |i: usize| {
+            let own = &glance[i];
+            let excess = |other: &&[Glance]| {
+                let other = &other[i];
+                other.mean - own.mean - SIGNIFICANT * (own.variance + other.variance).sqrt()
+            };
+            seen.iter().map(excess).fold(0.0, f64::max).powi(2)
+        };
+        trial.found = Ok(Measured {
+            samples: flown.samples(),
+            relmse: weighted(glance, &|i| glance[i].of_sample),
+            missed: weighted(glance, &missing),
+            seconds: flown.seconds(),
+            prepared: flown.prepared(),
+            whole: 0.0,
+        });
+    }
+    let measured = || trials.iter().filter_map(|t| t.found.as_ref().ok());
+    let least = |value: &dyn Fn(&Measured) -> f64| measured().map(value).fold(f64::MAX, f64::min);
+    let wanted = match work.stop {
+        Stop::Spp(n) => least(&|m| m.after(n.max(1) as f64)),
+        Stop::Time(limit) => least(&|m| {
+            let left = limit.as_secs_f64() - m.prepared;
+            m.after((left / m.seconds.max(1e-9)).max(1.0))
+        }),
+        Stop::Error { target, .. } => target.error * target.error,
+    };
+    for found in trials.iter_mut().filter_map(|t| t.found.as_mut().ok()) {
+        found.whole = found.prepared + found.seconds * found.until(wanted);
+    }
+}
+
+/// The one that is through first; the first of all where nothing is known.
+fn best(trials: &[Trial], flown: &[Option<Flown>]) -> Option<usize> {
+    let cost = |(i, trial): (usize, &Trial)| {
+        let margin = if trial.biased { MARGIN } else { 1.0 };
+        trial.found.as_ref().ok().map(|m| (i, margin * m.whole))
+    };
+    let measured = trials.iter().enumerate().filter_map(cost);
+    let best = measured.min_by(|a, b| a.1.total_cmp(&b.1));
+    best.map(|(i, _)| i)
+        .or_else(|| flown.iter().position(Option::is_some))
+}
