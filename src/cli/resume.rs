@@ -69,6 +69,7 @@ impl<'a> Rendering<'a> {
 /// The file beside an output that keeps what was done.
 pub struct Checkpoints<'a> {
     path: PathBuf,
+    output: &'a Path,
     interval: Option<Duration>,
     of: &'a Rendering<'a>,
     last: Instant,
@@ -81,12 +82,13 @@ pub struct Checkpoints<'a> {
 
 impl<'a> Checkpoints<'a> {
     pub fn new(
-        output: &Path,
+        output: &'a Path,
         interval: Option<Duration>,
         of: &'a Rendering<'a>,
     ) -> Checkpoints<'a> {
         Checkpoints {
             path: output.with_extension("checkpoint.exr"),
+            output,
             interval,
             of,
             last: Instant::now(),
@@ -96,28 +98,45 @@ impl<'a> Checkpoints<'a> {
         }
     }
 
-    /// What was done before.
+    /// What was done before: by the checkpoint, or without one by the shard itself, which holds as much.
     pub fn resume(&mut self) -> Result<(Film, Stats), Failure> {
         let Rendering { job, work, .. } = self.of;
-        let shown = self.path.display();
-        if !self.path.exists() {
+        self.exists = self.path.exists();
+        let saved = if self.exists {
+            self.read(&self.path)?
+        } else if work.shard.is_some() && self.output.exists() {
+            self.read(self.output)?
+        } else {
+            let shown = self.path.display();
             eprintln!("there is no {shown}: rendering from the start");
             return Ok((job.film_for(work), Stats::default()));
-        }
+        };
+        Ok((saved.film, saved.stats))
+    }
+
+    /// What was done of this very render, told to the user.
+    fn read(&self, path: &Path) -> Result<Saved, Failure> {
+        let shown = path.display();
         let wrong = |what: String| {
             Failure::Input(format!(
                 "cannot go on from {shown}: {what}; render with what it was made with, or remove it to begin anew"
             ))
         };
-        let saved = Saved::read(&self.path).map_err(wrong)?;
+        let saved = Saved::read(path).map_err(wrong)?;
         if let Some(what) = self.of.identity()?.difference(&saved.identity) {
             return Err(wrong(what));
         }
-        if saved.shard != work.shard {
+        if saved.shard != self.of.work.shard {
             return Err(wrong("it is of another shard".to_string()));
         }
-        self.exists = true;
-        Ok((saved.film, saved.stats))
+        match saved.is_complete() {
+            true => eprintln!("{shown} is complete: nothing is left to render"),
+            false => eprintln!(
+                "going on from {shown}: {} samples per pixel are done",
+                saved.film.spp()
+            ),
+        }
+        Ok(saved)
     }
 
     /// Writes the last one, unless none are wanted: gives a warning if that fails.
