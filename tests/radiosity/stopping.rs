@@ -3,7 +3,6 @@
 use crate::rooms::*;
 use luxel::radiosity::{self, Progress, Solution, SolveSpec};
 use std::ops::ControlFlow;
-use std::time::{Duration, Instant};
 
 /// Links are divided down to this size, however little they err.
 fn endless(min_size: f64) -> SolveSpec {
@@ -14,36 +13,38 @@ fn endless(min_size: f64) -> SolveSpec {
     }
 }
 
-/// What an observer sees until it stops, and how long that takes to be heard.
-fn stopped(spec: &SolveSpec, mut at: impl FnMut(&Progress) -> bool) -> (Solution, Duration) {
+/// The solution of an observer that stops when `at` says so, and the step that it stopped at.
+fn stopped(spec: &SolveSpec, mut at: impl FnMut(&Progress) -> bool) -> (Solution, u64) {
     let scene = scene(&room_of_blocks(1.0, 0.3));
-    let mut since = None;
+    let mut stopped = None;
     let mut observe = |p: &Progress| {
         assert_eq!(p.radiosity.len(), p.mesh.len());
+        assert_eq!(stopped, None, "asked again, though the end is wished");
         if at(p) {
-            since.get_or_insert_with(Instant::now);
+            stopped = Some(p.step);
             return ControlFlow::Break(());
         }
         ControlFlow::Continue(())
     };
     let solution = radiosity::solve(&scene, spec, &mut observe).unwrap();
-    let heard = since.expect("shown to the observer").elapsed();
-    (solution, heard)
+    (solution, stopped.expect("shown to the observer"))
 }
 
 #[test]
 fn links_that_would_take_minutes_end_when_that_is_wished() {
-    // Before there is any solution: millions of links of the lamp; and after the first: millions of others.
-    for (step, min_size) in [(0, 1e-3), (1, 0.1)] {
+    // Before there is any solution: links of the lamp; and after the first: others.
+    for (step, min_size) in [(0, 1e-5), (1, 1e-5)] {
         // The second time, so that the step is over and links are being made.
         let mut seen = 0;
-        let (solution, heard) = stopped(&endless(min_size), |p| {
+        let (solution, at) = stopped(&endless(min_size), |p| {
             seen += u32::from(p.step >= step);
             seen >= 2
         });
-        // Some gathering over the links that there are; seconds are for machines with other work.
-        assert!(heard < Duration::from_secs(5), "{heard:?}");
         let r = &solution.report;
+        println!(
+            "step {step}: {} links, {} steps, stopped at {at}",
+            r.links, r.steps
+        );
         assert!(!r.converged);
         let said = r
             .warnings
