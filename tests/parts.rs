@@ -119,12 +119,23 @@ fn what_does_not_belong_together_is_not_joined() {
         shard: Some(Shard { number: 2, of: 3 }),
     };
     let film = one.job.film_for(&work);
-    let empty = kept(&one, &work, &film, &Stats::default(), "empty");
-    let what = refused(vec![part(1), ("empty".to_string(), empty), part(3)]);
+    let empty = || {
+        let saved = kept(&one, &work, &film, &Stats::default(), "empty");
+        ("empty".to_string(), saved)
+    };
+    let what = refused(vec![part(1), empty(), part(3)]);
+    assert_eq!(
+        what,
+        "empty is not complete: 0 of its samples per pixel are there; go on with it by --shard 2/3 --resume"
+    );
+    let what = refused(vec![empty(), part(3)]);
     assert!(
-        what.starts_with("empty is not complete: 0 of its samples"),
+        what.ends_with("; with it, 2 of 3 shards are missing or not complete: 1/3, 2/3"),
         "{what}"
     );
+    // A checkpoint beside the shard that it became does no harm.
+    let merged = merge(vec![empty(), part(1), part(2), part(3)]).unwrap();
+    assert_eq!(merged.film.range(), Some(0..8));
     assert!(refused(Vec::new()).contains("no shards"));
 }
 

@@ -73,7 +73,7 @@ pub struct RenderArgs {
     /// Show the picture while it is rendered, in the viewer tev that listens there (by itself on 127.0.0.1:14158)
     #[arg(long, value_name = "HOST:PORT", value_parser = preview::parse_address)]
     pub preview: Option<String>,
-    /// Go on from the checkpoint beside the first output; without one, from the start
+    /// Go on from the checkpoint beside the first output, or from the shard that is there; without one, from the start
     #[arg(long)]
     pub resume: bool,
     /// How often to write a checkpoint beside the first output, as NAME.checkpoint.exr: 60s, 10m, never

@@ -71,14 +71,24 @@ impl<'a> Rendering<'a> {
     }
 }
 
+/// Time that writing the first checkpoint may take.
+fn expected(film: &Film) -> Duration {
+    /// Measured on one machine; after the first checkpoint it is known better.
+    const BYTES_PER_SECOND: f64 = 2e8;
+    let pixels = f64::from(film.window().width) * f64::from(film.window().height);
+    let sums = f64::from(film.replicates()) * 3.0 * 16.0;
+    Duration::from_secs_f64(pixels * sums / BYTES_PER_SECOND)
+}
+
 /// The file beside an output that keeps what was done.
 pub struct Checkpoints<'a> {
     path: PathBuf,
+    output: &'a Path,
     interval: Option<Duration>,
     of: &'a Rendering<'a>,
     last: Instant,
     /// What the last one took.
-    took: Duration,
+    took: Option<Duration>,
     failed: bool,
     /// Whether there is one that this render wrote or went on from.
     exists: bool,
@@ -86,43 +96,61 @@ pub struct Checkpoints<'a> {
 
 impl<'a> Checkpoints<'a> {
     pub fn new(
-        output: &Path,
+        output: &'a Path,
         interval: Option<Duration>,
         of: &'a Rendering<'a>,
     ) -> Checkpoints<'a> {
         Checkpoints {
             path: beside(output),
+            output,
             interval,
             of,
             last: Instant::now(),
-            took: Duration::ZERO,
+            took: None,
             failed: false,
             exists: false,
         }
     }
 
-    /// What was done before.
+    /// What was done before: by the checkpoint, or without one by the shard itself, which holds as much.
     pub fn resume(&mut self) -> Result<(Film, Stats), Failure> {
         let Rendering { job, work, .. } = self.of;
-        let shown = self.path.display();
-        if !self.path.exists() {
+        self.exists = self.path.exists();
+        let saved = if self.exists {
+            self.read(&self.path)?
+        } else if work.shard.is_some() && self.output.exists() {
+            self.read(self.output)?
+        } else {
+            let shown = self.path.display();
             eprintln!("there is no {shown}: rendering from the start");
             return Ok((job.film_for(work), Stats::default()));
-        }
+        };
+        Ok((saved.film, saved.stats))
+    }
+
+    /// What was done of this very render, told to the user.
+    fn read(&self, path: &Path) -> Result<Saved, Failure> {
+        let shown = path.display();
         let wrong = |what: String| {
             Failure::Input(format!(
                 "cannot go on from {shown}: {what}; render with what it was made with, or remove it to begin anew"
             ))
         };
-        let saved = Saved::read(&self.path).map_err(wrong)?;
+        let saved = Saved::read(path).map_err(wrong)?;
         if let Some(what) = self.of.identity()?.difference(&saved.identity) {
             return Err(wrong(what));
         }
-        if saved.shard != work.shard {
+        if saved.shard != self.of.work.shard {
             return Err(wrong("it is of another shard".to_string()));
         }
-        self.exists = true;
-        Ok((saved.film, saved.stats))
+        match saved.is_complete() {
+            true => eprintln!("{shown} is complete: nothing is left to render"),
+            false => eprintln!(
+                "going on from {shown}: {} samples per pixel are done",
+                saved.film.spp()
+            ),
+        }
+        Ok(saved)
     }
 
     /// Writes the last one, unless none are wanted: gives a warning if that fails.
@@ -136,7 +164,8 @@ impl<'a> Checkpoints<'a> {
     pub fn update(&mut self, film: &Film, stats: &Stats) -> Option<String> {
         /// Share of the time that writing may take.
         const SHARE: u32 = 100;
-        let interval = self.interval?.max(self.took * SHARE);
+        let took = self.took.unwrap_or_else(|| expected(film));
+        let interval = self.interval?.max(took * SHARE);
         if self.last.elapsed() < interval || film.samples() == 0 || stats.solving.is_some() {
             return None;
         }
@@ -149,7 +178,7 @@ impl<'a> Checkpoints<'a> {
         let start = Instant::now();
         let image = self.of.image(film, stats);
         let written = image.and_then(|image| Ok(image.write(&self.path)?));
-        (self.last, self.took) = (Instant::now(), start.elapsed());
+        (self.last, self.took) = (Instant::now(), Some(start.elapsed()));
         written?;
         self.exists = true;
         Ok(&self.path)

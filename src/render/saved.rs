@@ -3,6 +3,7 @@
 //! The file is an EXR: the picture so far, which any viewer shows, and a layer `state` with the film to the last bit.
 //! What determines the picture stands in it too, so that only what belongs together is joined.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -221,8 +222,8 @@ impl Saved {
         })
     }
 
-    /// Whether all of its samples were taken; shards of pictures that end otherwise do not exist.
-    fn is_complete(&self) -> bool {
+    /// Whether it is a shard of which all samples were taken; shards of pictures that end otherwise do not exist.
+    pub fn is_complete(&self) -> bool {
         let whole = self
             .shard
             .zip(self.planned)
@@ -239,6 +240,19 @@ fn planes(image: Image) -> Planes {
     };
     let channels = layer.map_or(Vec::new(), |layer| layer.channels);
     Planes(channels.into_iter().filter_map(plane).collect())
+}
+
+/// `2/8, 5/8 and 3 more`: those of the numbers up to `of` that are not in `there`.
+fn missing(there: &BTreeSet<u64>, of: u64) -> String {
+    /// More need not be named.
+    const SHOWN: usize = 20;
+    let absent = (1..=of).filter(|n| !there.contains(n));
+    let shown: Vec<String> = absent.take(SHOWN).map(|n| format!("{n}/{of}")).collect();
+    let more = (of - there.len() as u64).saturating_sub(SHOWN as u64);
+    match more {
+        0 => shown.join(", "),
+        more => format!("{} and {more} more", shown.join(", ")),
+    }
 }
 
 /// The whole picture's film and statistics, of its shards in any order: the same film bit for bit as if it had been
@@ -274,16 +288,29 @@ pub fn merge(mut shards: Vec<(String, Saved)>) -> Result<Saved, String> {
                 shard.of
             ));
         }
-        if !saved.is_complete() {
-            return Err(format!(
-                "{name} is not complete: {} of its samples per pixel are there; go on with it by --shard {}/{of} --resume",
-                saved.film.spp(),
-                shard.number
-            ));
-        }
+    }
+    let number = |saved: &Saved| saved.shard.map_or(0, |shard| shard.number);
+    // A checkpoint may lie beside a shard that was completed since.
+    let complete: BTreeSet<u64> = (shards.iter())
+        .filter(|(_, saved)| saved.is_complete())
+        .map(|(_, saved)| number(saved))
+        .collect();
+    shards.retain(|(_, saved)| saved.is_complete() || !complete.contains(&number(saved)));
+    if let Some((name, saved)) = shards.iter().find(|(_, saved)| !saved.is_complete()) {
+        let others = match of - complete.len() as u64 {
+            1 => String::new(),
+            n => format!(
+                "; with it, {n} of {of} shards are missing or not complete: {}",
+                missing(&complete, of)
+            ),
+        };
+        return Err(format!(
+            "{name} is not complete: {} of its samples per pixel are there; go on with it by --shard {}/{of} --resume{others}",
+            saved.film.spp(),
+            number(saved)
+        ));
     }
     shards.sort_by_key(|(_, saved)| saved.shard.map(|shard| shard.number));
-    let number = |saved: &Saved| saved.shard.map_or(0, |shard| shard.number);
     if let Some(twice) = shards
         .windows(2)
         .find(|w| number(&w[0].1) == number(&w[1].1))
@@ -295,25 +322,8 @@ pub fn merge(mut shards: Vec<(String, Saved)>) -> Result<Saved, String> {
             number(&twice[0].1)
         ));
     }
-    let missing = |n: &u64| shards.iter().all(|(_, saved)| number(saved) != *n);
-    let missing: Vec<String> = (1..=of)
-        .filter(missing)
-        .map(|n| format!("{n}/{of}"))
-        .collect();
-    if !missing.is_empty() {
-        /// More need not be named.
-        const SHOWN: usize = 20;
-        let more = missing.len().saturating_sub(SHOWN);
-        let and_more = if more > 0 {
-            format!(" and {more} more")
-        } else {
-            String::new()
-        };
-        let shown = &missing[..missing.len() - more];
-        return Err(format!(
-            "shards are missing: {}{and_more}",
-            shown.join(", ")
-        ));
+    if (complete.len() as u64) < of {
+        return Err(format!("shards are missing: {}", missing(&complete, of)));
     }
     let mut parts = shards.into_iter().map(|(_, saved)| saved);
     let Some(mut whole) = parts.next() else {

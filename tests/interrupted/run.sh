@@ -38,6 +38,7 @@ for way in "path --spp 400" "vcm --spp 60" "sppm --spp 60" "combined --spp 60" "
     "$luxel" render "$@" -o part.pfm --resume --checkpoint 50ms 2>part.log || fault "$way: $(cat part.log)"
     cmp -s whole.pfm part.pfm || fault "$way: the picture differs after $killed kills"
     [ -e part.checkpoint.exr ] && fault "$way: the checkpoint is left"
+    compgen -G '.luxel-*.tmp' && fault "$way: what was half written is left"
     echo "$way: killed $killed times, a checkpoint was there $resumed times"
 done
 

@@ -1,20 +1,21 @@
 #!/bin/bash
 # Renders the built-in scene over a real Slurm on this machine, by the job script that README.md shows, and compares
-# the picture with one rendered without Slurm, bit for bit. On the way the program is killed in one task, and the
-# machine of another is lost.
+# the picture with one rendered without Slurm, bit for bit. On the way the program is killed in one task, the machine of
+# another is lost, and a third is told that its time is nearly up. Then, what users do next: the array is sent off again
+# where all is done, a shard is missing, and another picture is sent off in the same folder.
 #
 #   tests/slurm/run.sh
 #
 # Needs Debian or Ubuntu, and root where Slurm is not installed yet; takes a few minutes. Everything runs as the
 # present user from a temporary folder, with ports and a munge key of its own, so that a Slurm of the system is not
 # touched, and all daemons end with the script. KEEP=1 keeps the folder. SPP=N renders N samples per pixel,
-# 64 by default: where the tasks are too short to be killed, take more. LUXEL=PROGRAM takes that program in place of
+# 128 by default: where the tasks are too short to be killed, take more. LUXEL=PROGRAM takes that program in place of
 # the one that is built here. Not part of `cargo test`.
 set -euo pipefail
 
 project=$(cd "$(dirname "$0")/../.." && pwd)
 shards=4
-spp=${SPP:-64}
+spp=${SPP:-128}
 patience=600 # seconds for all jobs
 
 say() { echo "== $*"; }
@@ -187,6 +188,60 @@ lose_machine() {
     wait_for 20 scontrol update nodename="$node" state=resume || fail "$node does not come back"
 }
 
+# Sends task $1 the signal that Slurm sends when the time is nearly up.
+signal_task() {
+    local job node
+    wait_for "$patience" running "$1" || fail "task $1 does not start"
+    read -r job node < <(running "$1")
+    wait_for 20 renderer "$job" "$node" || fail "no luxel runs in task $1"
+    sleep 5
+    scancel --batch --signal=USR1 "$job" || fail "task $1 was too short to be told: raise SPP"
+    say "told task $1 (job $job on $node) that its time is nearly up"
+}
+
+# Waits for all jobs, and checks how often each task was queued again: $1 is the array, the rest the numbers expected.
+all_done() {
+    local array=$1 task=0 expected tries
+    shift
+    wait_for "$patience" no_jobs || { squeue; fail "the jobs do not end within $patience s"; }
+    for expected in "$@"; do
+        task=$((task + 1))
+        tries=$(restarts "${array}_$task")
+        echo "task $task: $tries"
+        [ "$tries" = "Restarts=$expected" ] || fail "task $task has $tries, expected Restarts=$expected"
+    done
+}
+
+# Fails unless the file $1 has the text $2.
+has() { grep -q -e "$2" "$1" || { cat "$1"; fail "$1 does not say: $2"; }; }
+
+# What users do after the picture is done.
+afterwards() {
+    say "the same array again: all is there"
+    local again
+    again=$(sbatch --parsable shards.sh)
+    all_done "$again" 0 0 0 0
+    for task in $(seq "$shards"); do
+        has "slurm-${again}_$task.out" "shard-$task.exr is complete: nothing is left to render"
+    done
+    tail -n 2 "slurm-${again}_1.out"
+    say "a shard is missing"
+    mkdir aside
+    mv shard-3.exr aside
+    if luxel merge shard-*.exr -o none.exr 2>missing.log; then fail "a picture was merged of three shards"; fi
+    has missing.log "shards are missing: 3/4"
+    cat missing.log
+    mv aside/shard-3.exr .
+    say "another picture in the same folder"
+    sed -e 's/--spp [0-9]*/--spp 4/' -e 's/-lt 9/-lt 0/' shards.sh >others.sh
+    again=$(sbatch --parsable others.sh)
+    all_done "$again" 0 0 0 0
+    has "slurm-${again}_1.out" "cannot go on from shard-1.exr: end: $spp samples per pixel there, 4 samples per pixel here"
+    cat "slurm-${again}_1.out"
+    luxel merge shard-*.exr -o picture.pfm 2>/dev/null
+    cmp picture.pfm alone.pfm || fail "the other picture spoiled the first"
+}
+
 work=$(mktemp -d "${TMPDIR:-/tmp}/luxel-slurm.XXXXXX")
 slurm=$work/slurm
 mkdir "$slurm"
@@ -209,25 +264,19 @@ merge=$(sbatch --parsable --dependency=afterok:"$array" --kill-on-invalid-dep=ye
     --wrap 'luxel merge shard-*.exr -o picture.exr -o picture.pfm')
 say "submitted array $array and merge $merge"
 lose_machine 1
+signal_task 2
 # The last task has the number of the whole array for its own job: queueing that again must leave the others alone.
 kill_renderer "$shards"
-
-wait_for "$patience" no_jobs || { squeue; fail "the jobs do not end within $patience s"; }
+all_done "$array" 1 1 0 1
 say "logs of the tasks"
-tail -n 3 slurm-*.out merge.log || true
-for task in $(seq "$shards"); do
-    tries=$(restarts "${array}_$task")
-    echo "task $task: $tries"
-    case $task in
-    1 | "$shards") expected=Restarts=1 ;;
-    *) expected=Restarts=0 ;;
-    esac
-    [ "$tries" = "$expected" ] || fail "task $task has $tries, expected $expected"
-done
+tail -n 4 slurm-*.out merge.log
+has "slurm-${array}_2.out" "going on from shard-2.checkpoint.exr"
 [ -f picture.exr ] || fail "there is no merged picture"
 
 say "the same without Slurm"
 luxel render built-in.xml --spp "$spp" --progress never -o alone.exr -o alone.pfm
 cmp picture.pfm alone.pfm || fail "the pictures differ"
 luxel compare picture.exr alone.exr
+afterwards
+if compgen -G '.luxel-*.tmp'; then fail "temporary files are left"; fi
 say "PASSED: the picture of $shards shards over Slurm is that of one machine, bit for bit"
