@@ -147,7 +147,8 @@ fn a_picture_without_noise_is_no_trouble() {
     } = compile_with(&xml, &overrides);
     let work = Work::whole(Stop::Spp(16));
     let (choice, ..) = job.choose(choice.unwrap(), &work, go_on).unwrap();
-    assert_eq!(choice.options(), "--integrator path");
+    // All are perfect; which of them is quickest is up to the clock.
+    assert!(!choice.trials[choice.chosen].biased, "{choice:?}");
     let json = choice.to_json().to_string();
     assert!(!json.contains("NaN"), "{json}");
 }

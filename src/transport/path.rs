@@ -178,20 +178,31 @@ pub(super) trait Gather {
 
     /// Probability, greater than 0, that the walk goes on along an edge that was chosen: `throughput` is what the
     /// radiance along it counts for, `eta2` the squared relative index of refraction that it came through, `met`
-    /// what it meets, where that is known. `roulette`: by default it is played.
+    /// what it meets, where that is known. `played`: by default it is played, after so many edges.
     #[inline]
     fn survival(
         &mut self,
         throughput: Rgb,
         eta2: f32,
         _met: Option<&Option<Hit>>,
-        roulette: bool,
+        played: Option<u32>,
     ) -> f32 {
-        match roulette {
-            true => (throughput.max_component() * eta2).min(0.95),
-            false => 1.0,
-        }
+        played.map_or(1.0, |edges| survival(throughput, eta2, edges))
     }
+}
+
+/// Probability that roulette lets a walk go on after `edges` edges: what it counts for, but never more than a bound
+/// below 1, without which walks between perfect mirrors would not end.
+///
+/// A constant bound p would give albedos a with a² > p infinite variance, since the weight of walks that go on would grow
+/// by a / p each time. With this one, n edges are passed with a probability that falls as 1/n², so walks are of finite
+/// length in the mean, and for every a < 1 the sum over n of a²ⁿ over that probability is finite, too.
+#[inline]
+pub(super) fn survival(throughput: Rgb, eta2: f32, edges: u32) -> f32 {
+    /// Edges after which the bound is far on its way to 1: it begins at 0.95.
+    const LONG: f32 = 40.0;
+    let bound = 1.0 - 2.0 / (edges as f32 + LONG);
+    (throughput.max_component() * eta2).min(bound)
 }
 
 /// The next edge of a walk.
@@ -367,7 +378,8 @@ impl PathSpec {
             throughput *= sample.weight;
             eta2 *= sample.eta * sample.eta;
             if roulette || G::ENDS_EARLY {
-                let survival = gather.survival(throughput, eta2, met.as_ref(), roulette);
+                let played = roulette.then_some(depth);
+                let survival = gather.survival(throughput, eta2, met.as_ref(), played);
                 if u.roulette >= survival {
                     break;
                 }

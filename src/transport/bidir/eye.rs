@@ -8,7 +8,7 @@ use crate::math::{Rgb, Vec3};
 use crate::sampler::Sampler;
 use crate::transport::light_walk::LightVertex;
 use crate::transport::mis::{self, Leg, State, Techniques};
-use crate::transport::path::{SPREAD_VERTICES, first_seen};
+use crate::transport::path::{SPREAD_VERTICES, first_seen, survival};
 use crate::transport::{Ledger, Li, Technique, VertexNumbers};
 
 /// One walk from the eye.
@@ -115,7 +115,7 @@ impl EyeWalk<'_> {
             throughput *= sample.weight;
             eta2 *= sample.eta * sample.eta;
             if roulette {
-                let survival = (throughput.max_component() * eta2).min(0.95);
+                let survival = survival(throughput, eta2, depth);
                 if u.roulette >= survival {
                     break;
                 }

@@ -264,7 +264,7 @@ impl<G: Gather> Gather for Guiding<'_, G> {
         throughput: Rgb,
         eta2: f32,
         met: Option<&Option<Hit>>,
-        roulette: bool,
+        played: Option<u32>,
     ) -> f32 {
         let known = || {
             let (expected, met) = (self.expected?, met?.as_ref()?);
@@ -276,7 +276,7 @@ impl<G: Gather> Gather for Guiding<'_, G> {
         };
         match known() {
             Some(ratio) => (ratio / WINDOW).clamp(LEAST_SURVIVAL, 1.0),
-            None => self.gather.survival(throughput, eta2, met, roulette),
+            None => self.gather.survival(throughput, eta2, met, played),
         }
     }
 }
