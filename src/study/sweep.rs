@@ -6,7 +6,7 @@ use super::evaluate::{self, Row};
 use super::plan::{Method, Plan, ReferenceChoice, Study, StudyError};
 use super::reference::{Known, Maker, TIMES_BELOW};
 use super::runs::{self, Record};
-use super::statistics::{Gram, Weighing, mean_picture};
+use super::statistics::{Gram, Reference, Weighing, mean_picture};
 use super::{Picture, report, results};
 use crate::math::Rgb;
 
@@ -195,7 +195,7 @@ fn most_efficient(plan: &Plan, methods: &[Method]) -> Result<usize, StudyError> 
         let pictures: Vec<Picture> = pictures.collect::<Result<_, _>>()?;
         let records = runs.filter_map(|run| runs::kept(plan, &methods[m], amount, run));
         let seconds: f64 = records.map(|r| r.seconds).sum();
-        let mean = picture_of(pictures[0].width, &mean_picture(&pictures));
+        let mean = Reference::exact(picture_of(pictures[0].width, &mean_picture(&pictures)));
         let spread = Gram::of(&pictures, &mean, Weighing::Relative).squares();
         let cost = seconds * spread.iter().sum::<f64>();
         if cost < best.0 {
