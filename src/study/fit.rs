@@ -106,6 +106,11 @@ pub fn line(points: impl Iterator<Item = (f64, Estimate, usize)>) -> Option<Line
         _ if chi2 > (n - 2) as f64 => (chi2 / (n - 2) as f64, n - 2),
         _ => (1.0, runs_dof),
     };
+    // Numbers that are too far apart for f64 have no line.
+    let figures = [slope, height, center, scale / sxx, scale / all];
+    if figures.iter().any(|v| !v.is_finite()) {
+        return None;
+    }
     let t = crate::film::student_t_95(dof.clamp(1, 100_000) as u32);
     Some(Line {
         slope: Estimate::new(slope, (scale / sxx).sqrt(), t),
