@@ -216,8 +216,8 @@ impl<'a> Maker<'a> {
         Ok(())
     }
 
-    /// Means weighed by samples, which unlike estimated variances know nothing of the pictures, so that no luck decides;
-    /// variances of independent parts add by the squares of the weights.
+    /// Means weighed by samples, not by estimated variances: those know whether a part was lucky, and would count the
+    /// lucky ones more. Variances of independent parts add by the squares of the weights.
     fn add(&mut self, film: &Film) {
         let all = (self.spp + film.spp()) as f64;
         let (old, new) = (self.spp as f64 / all, film.spp() as f64 / all);

@@ -135,25 +135,36 @@ fn studies(case: &Case, truth: &Reference, studies: u64, runs: u64) -> [f64; 4] 
 
 #[test]
 fn what_is_printed_of_the_error_is_true() {
-    const SEEDS: u64 = 12;
-    let mut all = 0;
+    let (mut held, mut all) = (0, 0);
     for case in cases() {
-        let truth = truth(&case, 3072);
-        let (held, ratio) = printed(&case, &truth, 256, SEEDS);
+        // Where a few pixels at edges make the error, it takes more pictures to know it; walks from both ends have
+        // noise everywhere, and cost most.
+        let seeds = match (case.integrator, case.name) {
+            ("bdpt", _) => 12,
+            (_, "room") => 24,
+            _ => 40,
+        };
+        let truth = truth(&case, 2048);
+        let (of_case, ratio) = printed(&case, &truth, 256, seeds);
         println!(
-            "{}: {held} of {SEEDS}, printed / true {ratio:.3}",
+            "{}: {of_case} of {seeds}, printed / true {ratio:.3}",
             case.name
         );
-        // Binomial(12, 0.95) is below 8 once in 4,000.
-        assert!(held >= 8, "{}: {held} of {SEEDS}", case.name);
-        // What is promised. Twelve pictures of 100 pixels, whose channels go together, know their true error to
-        // √(2 / 1200) / 2 = 2 %, the printed one to as much again with its 3 degrees of freedom per pixel.
+        // Binomial(12, 0.95) is below 8 once in 4,000, Binomial(40, 0.95) below 32 once in 2,500.
+        assert!(
+            3 * of_case >= 2 * seeds,
+            "{}: {of_case} of {seeds}",
+            case.name
+        );
+        // What is promised. Pictures of 100 pixels, a tenth of which counts, know their true error to
+        // √(2 / (10 * 40)) / 2 = 4 %.
         assert!((ratio - 1.0).abs() < 0.1, "{}: {ratio}", case.name);
-        all += held;
+        (held, all) = (held + of_case, all + seeds);
     }
-    // Binomial(120, 0.95): 114 with a standard deviation of 2.4; four of them below. Channels that are taken as
-    // independent of each other, which makes intervals 1.7 times too narrow, hold 97.
-    assert!(all >= 105, "{all} of 120");
+    // Binomial(300, 0.95): 285 with a standard deviation of 3.8; four of them below. Channels that are taken as
+    // independent of each other, which makes intervals up to 1.7 times too narrow, hold some 245.
+    assert_eq!(all, 300);
+    assert!(held >= 270, "{held} of {all}");
 }
 
 /// The table of the shares of intervals that hold, printed. A minute or two: `cargo test --release --test coverage --

@@ -293,8 +293,9 @@ pub fn run(args: &StudyArgs, command_line: &str) -> Result<Outcome, Failure> {
 
 /// What an interrupted study leaves behind, and how to go on.
 fn kept_so_far(folder: &Path) -> String {
-    let runs =
-        std::fs::read_dir(folder.join("runs")).map_or(0, |entries| entries.flatten().count());
+    let is_run = |e: &std::fs::DirEntry| e.path().extension().is_some_and(|e| e == "exr");
+    let runs = std::fs::read_dir(folder.join("runs"))
+        .map_or(0, |entries| entries.flatten().filter(is_run).count());
     let name = folder.display();
     format!(
         "{runs} finished runs and what is done of the reference are kept in {name}; the run that was interrupted is not. \
