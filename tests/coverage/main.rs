@@ -12,7 +12,7 @@ use luxel::study::Picture;
 use luxel::study::fit::line;
 use luxel::study::statistics::Estimate;
 use luxel::study::statistics::{Gram, Moments, Reference, Weighing, mean_picture};
-use scenes::{Case, SIDE, cases, lamps_in_view};
+use scenes::{Case, SIDE, cases, hard_cases};
 
 fn compiled(case: &Case, seed: u64) -> Compiled {
     let overrides = Overrides {
@@ -161,10 +161,11 @@ fn what_is_printed_of_the_error_is_true() {
         assert!((ratio - 1.0).abs() < 0.1, "{}: {ratio}", case.name);
         (held, all) = (held + of_case, all + seeds);
     }
-    // Binomial(300, 0.95): 285 with a standard deviation of 3.8; four of them below. Channels that are taken as
-    // independent of each other, which makes intervals up to 1.7 times too narrow, hold some 245.
-    assert_eq!(all, 300);
-    assert!(held >= 270, "{held} of {all}");
+    // Binomial(328, 0.95): 312 with a standard deviation of 3.9; four of them below is 296. Some more is allowed, since a
+    // few pixels make most of the error in some of the scenes, which no symmetric interval suits. Channels that are taken as
+    // independent of each other, which makes intervals up to 1.7 times too narrow, hold some 265.
+    assert_eq!(all, 328);
+    assert!(held >= 285, "{held} of {all}");
 }
 
 /// The table of the shares of intervals that hold, printed. A minute or two: `cargo test --release --test coverage --
@@ -175,7 +176,7 @@ fn measure() {
     println!(
         "scene | printed 64 spp | 256 spp | told/true 64 | 256 || RMSE | error | bias | slope"
     );
-    for case in cases().into_iter().chain([lamps_in_view()]) {
+    for case in cases().into_iter().chain(hard_cases()) {
         let start = std::time::Instant::now();
         let truth = truth(&case, 16 * 1024);
         let t1 = start.elapsed().as_secs_f64();
