@@ -220,10 +220,11 @@ impl Convergence {
         let Some(spp) = line.where_it_falls_to(target) else {
             return Forecast::Unknown;
         };
-        let time = |n: f64| before + each * n.max(1.0);
+        // No time per sample is none for any number of them, however many.
+        let time = |n: f64| before + if each > 0.0 { each * n.max(1.0) } else { 0.0 };
         let seconds = Estimate {
             value: time(spp.value),
-            sd: each * spp.sd,
+            sd: if each > 0.0 { each * spp.sd } else { 0.0 },
             low: time(spp.low),
             high: time(spp.high),
         };
@@ -269,11 +270,13 @@ fn bias(points: &[FitPoint], noise: Option<&Line>) -> Option<Bias> {
 
 /// Line through seconds over samples, by relative errors, with neither part below zero.
 fn seconds(points: &[FitPoint]) -> Option<[f64; 2]> {
-    let usable = || points.iter().filter(|p| p.seconds > 0.0 && p.spp > 0.0);
+    let known = |v: f64| v > 0.0 && v.is_finite();
+    let usable = || (points.iter()).filter(|p| known(p.seconds) && known(p.spp));
     let count = usable().count();
     let (mut s, mut sx, mut sy, mut sxx, mut sxy) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for p in usable() {
-        let w = 1.0 / (p.seconds * p.seconds);
+        // Clocks tell no shorter times.
+        let w = p.seconds.max(1e-9).powi(-2);
         s += w;
         sx += w * p.spp;
         sy += w * p.seconds;
