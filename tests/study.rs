@@ -152,6 +152,12 @@ fn noise_falls_by_the_root_and_a_wrong_scale_is_bias() {
     let json = folder.json("out/results.json");
     // Its own error ten times below, by its own account.
     assert_eq!(json["reference"]["ten_times_below"], true);
+    assert!(number(&json["reference"]["times_below"]) >= 10.0);
+    let floor = number(&json["reference"]["flip_floor"]);
+    for point in json["points"].as_array().unwrap() {
+        let resolved = number(&point["flip"]["value"]) >= 3.0 * floor;
+        assert_eq!(point["flip_resolved"], resolved, "{point}");
+    }
     let method = &json["methods"][0];
     let slope = &method["error_slope"];
     assert!(
@@ -249,6 +255,65 @@ fn studies_go_on_and_use_what_is_there() {
             assert!((a[c] - b[c]).abs() <= 1e-3 * b[c].abs() + 1e-6);
         }
     }
+}
+
+#[test]
+fn a_reference_that_is_not_good_enough_is_said_to_be_so() {
+    let folder = Folder::new("short");
+    folder.write("ball.xml", BALL);
+    let said = folder.done("ball.xml -o out --spp 16,64 --runs 3 --reference-time 1ms");
+    let reference = &folder.json("out/results.json")["reference"];
+    assert_eq!(reference["ten_times_below"], false);
+    let times = number(&reference["times_below"]);
+    let words = match times > 1.0 {
+        true => format!("{times:.1} times below the smallest one studied, not 10"),
+        false => "is not below the smallest one studied".to_string(),
+    };
+    assert!(said.contains(&words), "{times}: {said}");
+    assert!(said.contains("--reference-time"), "{said}");
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_study_says_what_it_kept_and_goes_on() {
+    let folder = Folder::new("interrupt");
+    folder.write("ball.xml", BALL);
+    // Its first runs take no time, its last ones minutes.
+    let line = "ball.xml -o out --spp 1,10000000 --runs 3 --reference-time 1s";
+    let child = Command::new(env!("CARGO_BIN_EXE_luxel"))
+        .current_dir(&folder.0)
+        .arg("study")
+        .args(line.split_whitespace())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let is_run = |e: &fs::DirEntry| e.path().extension().is_some_and(|e| e == "exr");
+    let finished = || {
+        fs::read_dir(folder.0.join("out/runs")).map_or(0, |d| d.flatten().filter(is_run).count())
+    };
+    for _ in 0..300 {
+        if finished() >= 3 {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(100));
+    }
+    let id = child.id().to_string();
+    assert!(
+        Command::new("kill")
+            .args(["-INT", &id])
+            .status()
+            .unwrap()
+            .success()
+    );
+    let output = child.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(130), "{said}");
+    assert!(
+        said.contains("stopped: 3 finished runs and what is done of the reference are kept in out"),
+        "{said}"
+    );
+    let said = folder.done("ball.xml -o out --spp 1 --runs 3 --reference-time 1s");
+    assert!(said.contains("3 runs were there"), "{said}");
 }
 
 #[test]

@@ -34,8 +34,6 @@ struct Spread {
     mean: f64,
     /// Variance of the mean.
     variance: f64,
-    /// Estimated variance of `variance` itself.
-    variance_of_variance: f64,
     /// Estimated covariance of `variance` and `mean`: positive for a skewed estimator.
     covariance: f64,
 }
@@ -86,7 +84,7 @@ impl Film {
             variance += error.variance;
             count += error.count;
         }
-        let (relmse, half) = (relmse / count, 1.96 * variance.sqrt() / count);
+        let (relmse, half) = (relmse / count, 1.96 * variance.max(0.0).sqrt() / count);
         Some(ErrorEstimate {
             relmse,
             ci95: [(relmse - half).max(0.0), relmse + half],
@@ -99,7 +97,7 @@ impl Film {
 pub struct TileError {
     /// Of variance / (mean² + 0.01).
     pub relative: f64,
-    /// Of the variance of that.
+    /// Of the variance of its distance to the actual one.
     pub variance: f64,
     pub count: f64,
 }
@@ -117,16 +115,20 @@ impl Tile {
     /// What the replicates say of the error; zero where they are too few.
     pub fn error(&self) -> TileError {
         let mut sum = TileError::default();
+        if !self.has_error() {
+            return sum;
+        }
         for i in 0..(self.width * self.height) as usize {
-            for c in 0..3 {
-                let Some(s) = self.spread(i, c) else { continue };
+            let spreads: [Spread; 3] = std::array::from_fn(|c| self.spread_over(i, c, 0, 1));
+            let weights = spreads
+                .each_ref()
+                .map(|s| 1.0 / (s.mean * s.mean + RELMSE_FLOOR));
+            for (c, s) in spreads.iter().enumerate() {
                 sum.relative += s.relative();
-                // The estimate errs by the uncertainty of the variance; the actual squared error of
-                // this one picture scatters about its expectation by twice the variance squared.
-                let weight = 1.0 / (s.mean * s.mean + RELMSE_FLOOR);
-                sum.variance +=
-                    (s.variance_of_variance + 2.0 * s.variance.powi(2)) * weight.powi(2);
                 sum.count += 1.0;
+                for d in 0..3 {
+                    sum.variance += weights[c] * weights[d] * self.scatter(i, [c, d], &spreads);
+                }
             }
         }
         sum
@@ -169,6 +171,49 @@ impl Tile {
         Some(self.spread_over(i, c, 0, 1))
     }
 
+    /// Covariance, over channels `c` and `d` of a pixel, of how far the estimated variance of the mean V is from the
+    /// squared error e² that this one picture happens to have.
+    ///
+    /// With R replicates of covariance Σ and fourth cumulant κ, cov(V_c, V_d) = (κ / R + 2 Σ² / (R - 1)) / R²,
+    /// cov(e_c², e_d²) = κ / R³ + 2 Σ² / R², and cov(V_c, e_d²) = κ / R³: the cumulants cancel, and what is left is
+    /// 2 (Σ / R)² R / (R - 1), whatever the noise is distributed like. Channels of one pixel go nearly together, so that
+    /// what is between them counts as much as they do.
+    fn scatter(&self, pixel: usize, [c, d]: [usize; 2], spreads: &[Spread; 3]) -> f64 {
+        let all = self.replicates as usize;
+        let dof = (all - 1) as f64;
+        let product = spreads[c].variance * spreads[d].variance;
+        let square = if c == d || all < 4 {
+            // Of so few replicates nothing tells how far channels go together: all the way at worst. The square of a
+            // variance of `dof` degrees of freedom is 1 + 2 / dof times too large in the mean.
+            product * dof / (dof + 2.0)
+        } else {
+            // Σ² without bias from the sample's covariances S: with normal noise, E S_cd² = Σ_cd² (1 + 1/dof) +
+            // Σ_cc Σ_dd / dof and E S_cc S_dd = Σ_cc Σ_dd + 2 Σ_cd² / dof (Wishart's moments).
+            let square = self.covariance(pixel, [c, d], spreads).powi(2);
+            (square - product / dof) * dof * dof / ((dof + 2.0) * (dof - 1.0))
+        };
+        2.0 * square * (dof + 1.0) / dof
+    }
+
+    /// Of the means of two channels of a pixel, on the scale of [`Spread::variance`].
+    fn covariance(&self, pixel: usize, [c, d]: [usize; 2], spreads: &[Spread; 3]) -> f64 {
+        let all = self.replicates as usize;
+        let sums = &self.rgb[pixel * all..(pixel + 1) * all];
+        let (mut both, mut own) = (0.0, 0.0);
+        for (i, sums) in sums.iter().enumerate() {
+            let n_r = self.taken.of_replicate(i, all) as f64;
+            let of = |c: usize| sums[c].value() / n_r - spreads[c].mean;
+            both += n_r * of(c) * of(d);
+            own += n_r * of(c) * of(c);
+        }
+        // As the variance is scaled from the sum of squares.
+        if own > 0.0 {
+            both / own * spreads[c].variance
+        } else {
+            0.0
+        }
+    }
+
     /// By the replicates `first`, `first + step` and so on. A replicate of n_r of the n samples has the variance
     /// σ²/n_r, so Σ n_r (m_r - m)² / (R - 1) estimates σ², and σ²/n is the variance of the mean.
     fn spread_over(&self, pixel: usize, c: usize, first: usize, step: usize) -> Spread {
@@ -188,18 +233,14 @@ impl Tile {
             mean = self.taken.mean(|i| sums[i][c], all);
             n = 4.0 / (1.0 / *even as f64 + 1.0 / *odd as f64);
         }
-        let (mut second, mut third, mut fourth) = (0.0, 0.0, 0.0);
+        let (mut second, mut third) = (0.0, 0.0);
         for i in numbers() {
             let n_r = n_of(i);
             let d = n_r.sqrt() * (sums[i][c].value() / n_r - mean);
             second += d * d;
             third += d * d * d;
-            fourth += (d * d).powi(2);
         }
         let sigma2 = second / (r - 1.0);
-        // Variance of a sample variance: (m4 - σ⁴ (r - 3)/(r - 1)) / r, never below the normal case's
-        // lower bound of zero.
-        let of_sigma2 = ((fourth / r - sigma2 * sigma2 * (r - 3.0) / (r - 1.0)) / r).max(0.0);
         // Third central moment of the mean over n, from that of the replicates scaled by sqrt(n/r).
         let third = if r > 2.0 {
             third * r / ((r - 1.0) * (r - 2.0))
@@ -210,7 +251,6 @@ impl Tile {
         Spread {
             mean,
             variance: sigma2 / n,
-            variance_of_variance: of_sigma2 / (n * n),
             covariance,
         }
     }

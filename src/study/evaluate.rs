@@ -110,7 +110,7 @@ pub fn row(
     let reference = &known.reference;
     let mean = mean_picture(&pictures);
     let moments = |weighing| {
-        let gram = Gram::of(&pictures, &reference.picture, weighing);
+        let gram = Gram::of(&pictures, reference, weighing);
         Moments::of(&gram, reference, &mean, weighing)
     };
     let judge = |picture: &Picture| {

@@ -62,11 +62,13 @@ impl Line {
 /// points of different x.
 pub fn line(points: impl Iterator<Item = (f64, Estimate, usize)>) -> Option<Line> {
     let usable: Vec<_> = points
-        .filter(|(x, y, _)| *x > 0.0 && y.value > 0.0 && y.value.is_finite())
+        .filter(|(x, y, _)| {
+            let finite = x.is_finite() && y.value.is_finite() && y.sd.is_finite();
+            finite && *x > 0.0 && y.value > 0.0
+        })
         .collect();
     let n = usable.len();
-    let (first, last) = (usable.first()?, usable.last()?);
-    if n < 2 || first.0 == last.0 {
+    if usable.iter().all(|(x, ..)| *x == usable[0].0) {
         return None;
     }
     // Deviation of ln sqrt(y).
@@ -104,6 +106,11 @@ pub fn line(points: impl Iterator<Item = (f64, Estimate, usize)>) -> Option<Line
         _ if chi2 > (n - 2) as f64 => (chi2 / (n - 2) as f64, n - 2),
         _ => (1.0, runs_dof),
     };
+    // Numbers that are too far apart for f64 have no line.
+    let figures = [slope, height, center, scale / sxx, scale / all];
+    if figures.iter().any(|v| !v.is_finite()) {
+        return None;
+    }
     let t = crate::film::student_t_95(dof.clamp(1, 100_000) as u32);
     Some(Line {
         slope: Estimate::new(slope, (scale / sxx).sqrt(), t),
@@ -154,6 +161,8 @@ pub struct Convergence {
     pub seconds: Option<[f64; 2]>,
     /// No setting has any error.
     pub exact: bool,
+    /// The fewest samples without any error, with their seconds.
+    pub exact_from: Option<[f64; 2]>,
 }
 
 impl Convergence {
@@ -165,8 +174,8 @@ impl Convergence {
             bias: bias(points, noise.as_ref()),
             noise,
             seconds: seconds(points),
-            exact: !points.is_empty()
-                && points.iter().all(|p| p.mse.value == 0.0 && p.mse.sd == 0.0),
+            exact: !points.is_empty() && points.iter().all(is_exact),
+            exact_from: exact_from(points),
         }
     }
 
@@ -174,6 +183,24 @@ impl Convergence {
     pub fn forecast(&self, wanted: f64) -> Forecast {
         if self.exact {
             return Forecast::Exact;
+        }
+        if let Some([spp, seconds]) = self.exact_from {
+            // Measured: nothing that a line says can take more.
+            let by_line = self.by_line(wanted);
+            return match by_line {
+                Forecast::Reached { spp: n, .. } if n.value < spp => by_line,
+                _ => Forecast::Reached {
+                    spp: Estimate::exact(spp),
+                    seconds: Estimate::exact(seconds),
+                },
+            };
+        }
+        self.by_line(wanted)
+    }
+
+    fn by_line(&self, wanted: f64) -> Forecast {
+        if wanted.is_nan() || wanted <= 0.0 {
+            return Forecast::Unknown;
         }
         let (line, target) = match self.bias {
             Some(Bias::Stays { last, .. }) => {
@@ -193,15 +220,26 @@ impl Convergence {
         let Some(spp) = line.where_it_falls_to(target) else {
             return Forecast::Unknown;
         };
-        let time = |n: f64| before + each * n.max(1.0);
+        // No time per sample is none for any number of them, however many.
+        let time = |n: f64| before + if each > 0.0 { each * n.max(1.0) } else { 0.0 };
         let seconds = Estimate {
             value: time(spp.value),
-            sd: each * spp.sd,
+            sd: if each > 0.0 { each * spp.sd } else { 0.0 },
             low: time(spp.low),
             high: time(spp.high),
         };
         Forecast::Reached { spp, seconds }
     }
+}
+
+fn is_exact(p: &FitPoint) -> bool {
+    p.mse.value == 0.0 && p.mse.sd == 0.0 && p.mse.high == 0.0
+}
+
+/// Of the settings at the end that have no error, the first.
+fn exact_from(points: &[FitPoint]) -> Option<[f64; 2]> {
+    let at_end = points.iter().rev().take_while(|p| is_exact(p));
+    at_end.last().map(|p| [p.spp, p.seconds])
 }
 
 fn bias(points: &[FitPoint], noise: Option<&Line>) -> Option<Bias> {
@@ -232,11 +270,13 @@ fn bias(points: &[FitPoint], noise: Option<&Line>) -> Option<Bias> {
 
 /// Line through seconds over samples, by relative errors, with neither part below zero.
 fn seconds(points: &[FitPoint]) -> Option<[f64; 2]> {
-    let usable = || points.iter().filter(|p| p.seconds > 0.0 && p.spp > 0.0);
+    let known = |v: f64| v > 0.0 && v.is_finite();
+    let usable = || (points.iter()).filter(|p| known(p.seconds) && known(p.spp));
     let count = usable().count();
     let (mut s, mut sx, mut sy, mut sxx, mut sxy) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for p in usable() {
-        let w = 1.0 / (p.seconds * p.seconds);
+        // Clocks tell no shorter times.
+        let w = p.seconds.max(1e-9).powi(-2);
         s += w;
         sx += w * p.spp;
         sy += w * p.seconds;
@@ -337,6 +377,103 @@ mod tests {
         assert_eq!(c.forecast(0.01), Forecast::Exact);
         let nothing = Convergence::of(&[]);
         assert_eq!(nothing.forecast(0.01), Forecast::Unknown);
+    }
+
+    #[test]
+    fn other_powers_are_found_and_noise_is_in_their_interval() {
+        // N^-3/4, as of well-spread points, with errors of some per cent on the squares.
+        let mut all = points(|n| (0.0, 0.04 * n.powf(-1.5)));
+        for (k, p) in all.iter_mut().enumerate() {
+            let by = 1.0 + 0.03 * if k % 2 == 0 { 1.0 } else { -1.0 };
+            (p.mse.value, p.variance.value) = (p.mse.value * by, p.variance.value * by);
+        }
+        let c = Convergence::of(&all);
+        let slope = c.error.unwrap().slope;
+        assert!(slope.low < -0.75 && slope.high > -0.75, "{slope:?}");
+        assert!(slope.high - slope.low < 0.05, "{slope:?}");
+        // 0.2 N^-3/4 is 0.002 at N = 100^(2/1.5).
+        let Forecast::Reached { spp, .. } = c.forecast(0.002) else {
+            panic!("{:?}", c.forecast(0.002));
+        };
+        let truth = 1e4f64.powf(1.0 / 1.5);
+        assert!(spp.low < truth && truth < spp.high, "{spp:?} {truth}");
+    }
+
+    #[test]
+    fn two_settings_have_a_line_with_an_interval() {
+        let c = Convergence::of(&points(|n| (0.0, 0.04 / n))[3..5]);
+        let slope = c.error.unwrap().slope;
+        assert!((slope.value + 0.5).abs() < 1e-9);
+        assert!(slope.low < -0.5 && slope.high > -0.5 && slope.high - slope.low < 0.5);
+        assert!(matches!(c.forecast(0.01), Forecast::Reached { .. }));
+    }
+
+    #[test]
+    fn settings_of_the_same_samples_have_no_slope() {
+        // Times so short that all come to one sample per pixel.
+        let mut all = points(|n| (0.0, 0.04 / n));
+        all.iter_mut().for_each(|p| p.spp = 1.0);
+        let c = Convergence::of(&all);
+        assert!(c.error.is_none() && c.noise.is_none());
+        assert_eq!(c.forecast(0.01), Forecast::Unknown);
+        // And where only the first and the last are alike, all are used.
+        all[4].spp = 4.0;
+        assert!(Convergence::of(&all).error.is_some());
+    }
+
+    #[test]
+    fn what_was_measured_without_error_is_reached() {
+        // An error of 0.2 / √N that is gone from 64 samples on.
+        let mut all = points(|n| (0.0, if n < 64.0 { 0.04 / n } else { 0.0 }));
+        for p in &mut all[6..] {
+            (p.mse, p.bias2, p.variance) = (
+                Estimate::exact(0.0),
+                Estimate::exact(0.0),
+                Estimate::exact(0.0),
+            );
+        }
+        let c = Convergence::of(&all);
+        assert!(!c.exact && (c.error.unwrap().slope.value + 0.5).abs() < 1e-9);
+        let spp = |wanted: f64| match c.forecast(wanted) {
+            Forecast::Reached { spp, seconds } => {
+                assert!(seconds.value.is_finite());
+                spp.value
+            }
+            other => panic!("{other:?}"),
+        };
+        assert!((spp(0.04) - 25.0).abs() < 1e-6);
+        assert_eq!((spp(0.01), spp(1e-9)), (64.0, 64.0));
+    }
+
+    #[test]
+    fn no_number_is_ever_nonsense() {
+        // Negative, infinite and unknown values in every place.
+        let odd = [0.0, -1e-3, f64::NAN, f64::INFINITY, 1e-300, 1e300, 0.04];
+        for a in odd {
+            for b in odd {
+                let mut all = points(|n| (0.0, 0.04 / n));
+                all[2].mse = Estimate::new(a, b.abs(), 2.0);
+                all[5].variance = Estimate::new(b, a, 2.0);
+                all[8].bias2 = Estimate::new(a, b, 2.0);
+                all[7].seconds = if b.is_finite() { b } else { 1.0 };
+                let c = Convergence::of(&all);
+                let lines = [c.error, c.noise].into_iter().flatten();
+                for line in lines {
+                    assert!(
+                        !line.slope.value.is_nan() && !line.at_center.value.is_nan(),
+                        "{a} {b}: {line:?}"
+                    );
+                }
+                for wanted in [0.0, -1.0, f64::NAN, 1e-300, 0.01, 1e300] {
+                    if let Forecast::Reached { spp, seconds } = c.forecast(wanted) {
+                        assert!(
+                            !spp.value.is_nan() && !seconds.value.is_nan(),
+                            "{a} {b} {wanted}"
+                        );
+                    }
+                }
+            }
+        }
     }
 
     #[test]

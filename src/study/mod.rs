@@ -8,6 +8,7 @@ pub mod error_map;
 pub mod evaluate;
 pub mod fit;
 pub mod flip;
+pub mod flip_floor;
 pub mod memory;
 pub mod metrics;
 pub mod plan;

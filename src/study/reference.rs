@@ -14,6 +14,7 @@ use super::statistics::{Reference, Weighing};
 use crate::film::{Film, Window};
 use crate::image_io::{Image, Layer, Samples, read_metadata};
 use crate::math::Rgb;
+use crate::render::{Stop, Target};
 
 /// The reference's error is to be this much below the smallest one studied.
 pub const TIMES_BELOW: f64 = 10.0;
@@ -74,8 +75,24 @@ pub struct Maker<'a> {
 /// Samples of the first part, per pixel: enough for its spread to tell an error.
 const FIRST_PART: u64 = 64;
 
-/// A part takes at most this many times the samples that there are: forecasts from few samples err.
-const GROWTH: u64 = 3;
+/// A part takes at most this many times the samples that there are, as long as the reference's own error is not small
+/// beside the errors studied: what these are is not known well then.
+const GROWTH: f64 = 3.0;
+
+/// What a part brings relMSE to is aimed at this much below the target, so as not to miss by a hair again and again.
+const AIM: f64 = 1.1;
+
+/// A reference whose relMSE is below this share of the smallest one studied knows that one well.
+const KNOWS: f64 = 0.25;
+
+/// What a part of a reference is to bring.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Part {
+    /// Samples per pixel, where all pixels get alike.
+    pub spp: u64,
+    /// relMSE of the part alone, where pixels get samples by their error; `None` in the first part.
+    pub rel_mse: Option<f64>,
+}
 
 impl<'a> Maker<'a> {
     /// What is kept in the folder from an earlier time, or nothing yet.
@@ -137,40 +154,58 @@ impl<'a> Maker<'a> {
         })
     }
 
-    /// Samples that bring relMSE from `now` to `target`, if it falls as one over them; as many as are wise to
-    /// take at once.
-    pub fn next_part(&self, now: f64, target: f64) -> u64 {
+    /// The part that brings relMSE from `now` to `target`, if it falls as one over the samples, or as near to it as is
+    /// wise to go at once. All in one, if possible: well-spread points are better the more of them belong together.
+    pub fn next_part(&self, now: f64, target: f64) -> Part {
         if self.spp == 0 {
-            return FIRST_PART;
+            return Part {
+                spp: FIRST_PART,
+                rel_mse: None,
+            };
         }
-        let missing = self.spp as f64 * (now / target.max(f64::MIN_POSITIVE) - 1.0);
-        // A little more than that, so as not to miss by a hair again and again.
-        ((1.1 * missing).min(1e15) as u64).clamp(FIRST_PART.min(self.spp), GROWTH * self.spp)
+        let target = target.max(f64::MIN_POSITIVE);
+        let knows = now <= KNOWS * TIMES_BELOW * TIMES_BELOW * target;
+        let most = if knows { 1e6 } else { GROWTH };
+        // So many times the samples that there are.
+        let times = (AIM * now / target - 1.0).clamp(0.0, most);
+        let spp = (times * self.spp as f64).min(1e15) as u64;
+        Part {
+            spp: spp.max(FIRST_PART.min(self.spp)),
+            rel_mse: Some(now / times.max(1e-3)),
+        }
     }
 
-    /// Adds `n` samples per pixel, or what is done of them until `limit` or `stopped`, and keeps the result. Only
-    /// a part of 4 samples or more counts: fewer tell no error.
+    /// Adds a part, or what is done of it until `limit` or `stopped`, and keeps the result. Where the integrator
+    /// allows it, the part has samples where the error is. Only a part whose spread tells an error counts.
     ///
     /// # Errors
     /// The scene cannot be rendered so, or the file cannot be written.
     pub fn extend(
         &mut self,
         method: &mut Method,
-        n: u64,
+        part: Part,
         limit: Duration,
         stopped: &dyn Fn() -> bool,
     ) -> Result<(), StudyError> {
         method.job.seed = self.plan.reference_seed(self.spp);
+        let stop = match part.rel_mse {
+            Some(rel_mse) if method.job.is_adaptive() && rel_mse > 0.0 => Stop::Error {
+                target: Target {
+                    error: rel_mse.sqrt(),
+                    quantile: None,
+                },
+                within: Some(limit),
+            },
+            _ => Stop::Spp(part.spp),
+        };
         let start = Instant::now();
-        let rendered = method
-            .job
-            .render(super::plan::Amount::Spp(n).stop(), |film, _| {
-                let enough = start.elapsed() >= limit && film.has_error();
-                match enough || stopped() {
-                    true => ControlFlow::Break(()),
-                    false => ControlFlow::Continue(()),
-                }
-            });
+        let rendered = method.job.render(stop, |film, _| {
+            let enough = start.elapsed() >= limit && film.has_error();
+            match enough || stopped() {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            }
+        });
         let (film, stats) =
             rendered.map_err(|e| StudyError::Input(format!("the reference: {e}")))?;
         self.seconds += stats.seconds;
@@ -181,7 +216,8 @@ impl<'a> Maker<'a> {
         Ok(())
     }
 
-    /// Means weighed by samples; variances of independent parts add by the squares of the weights.
+    /// Means weighed by samples, not by estimated variances: those know whether a part was lucky, and would count the
+    /// lucky ones more. Variances of independent parts add by the squares of the weights.
     fn add(&mut self, film: &Film) {
         let all = (self.spp + film.spp()) as f64;
         let (old, new) = (self.spp as f64 / all, film.spp() as f64 / all);

@@ -6,7 +6,9 @@ use serde_json::{Value, json};
 
 use super::evaluate::{Row, common_scale};
 use super::fit::{Bias, Convergence, FitPoint, Forecast};
+use super::flip_floor;
 use super::plan::{FORMAT, Study, StudyError};
+use super::reference::TIMES_BELOW;
 use super::statistics::Estimate;
 use super::sweep::Findings;
 use crate::image_io::write_atomic;
@@ -44,7 +46,10 @@ pub fn to_json(study: &Study, findings: &Findings) -> Value {
             "seconds": known.seconds,
             "relmse": known.rel_mse,
             "error": known.rel_mse.map(f64::sqrt),
-            "ten_times_below": findings.reference_good,
+            // No number where there is no error at all.
+            "times_below": findings.times_below,
+            "ten_times_below": findings.times_below.map(|t| t >= TIMES_BELOW),
+            "flip_floor": findings.flip_floor,
         },
         "methods": methods,
         "points": points,
@@ -166,6 +171,10 @@ fn row_json(study: &Study, findings: &Findings, row: &Row) -> Value {
         "rmse_noise": estimate(row.absolute.variance.root()),
         "brightness": row.brightness.map(estimate),
         "flip": estimate(row.flip),
+        // Too near to what the reference's noise makes alone.
+        "flip_resolved": findings.flip_floor.is_none_or(|floor| {
+            row.flip.value == 0.0 && floor == 0.0 || row.flip.value >= flip_floor::RESOLVED * floor
+        }),
         "efficiency": row.efficiency().map(estimate),
         "claims_held": row.claims_held(findings.reference.rel_mse.unwrap_or(0.0)),
         "front": row.front,
@@ -182,7 +191,7 @@ fn row_json(study: &Study, findings: &Findings, row: &Row) -> Value {
 }
 
 /// Columns of the CSV: its name, and where the value stands in a point of the JSON.
-const COLUMNS: [(&str, &str); 32] = [
+const COLUMNS: [(&str, &str); 33] = [
     ("method", "/method"),
     ("amount", "/amount"),
     ("spp", "/spp"),
@@ -212,6 +221,7 @@ const COLUMNS: [(&str, &str); 32] = [
     ("flip", "/flip/value"),
     ("flip_low", "/flip/ci95/0"),
     ("flip_high", "/flip/ci95/1"),
+    ("flip_resolved", "/flip_resolved"),
     ("efficiency", "/efficiency/value"),
     ("front", "/front"),
     ("command", "/command"),

@@ -6,17 +6,19 @@ use super::evaluate::{self, Row};
 use super::plan::{Method, Plan, ReferenceChoice, Study, StudyError};
 use super::reference::{Known, Maker, TIMES_BELOW};
 use super::runs::{self, Record};
-use super::statistics::{Gram, Weighing, mean_picture};
-use super::{Picture, report, results};
+use super::statistics::{Gram, Reference, Weighing, mean_picture};
+use super::{Picture, flip_floor, report, results};
 use crate::math::Rgb;
 
 /// What a study found.
 #[derive(Debug)]
 pub struct Findings {
     pub reference: Known,
-    /// Whether the reference's error is as far below the smallest one studied as it should be; `None` where
-    /// its error is not known.
-    pub reference_good: Option<bool>,
+    /// How many times the reference's error is below the smallest one studied ([`TIMES_BELOW`] is what it should
+    /// be), infinite for an exact one; `None` where its error is not known.
+    pub times_below: Option<f64>,
+    /// FLIP that the reference's noise makes alone, where that is known.
+    pub flip_floor: Option<f64>,
     /// Method by method, and for each by increasing amounts.
     pub rows: Vec<Row>,
 }
@@ -40,7 +42,7 @@ pub fn run(
     let Some(records) = all_runs(study, stopped, say)? else {
         return Ok(None);
     };
-    let Some((reference, good)) = reference(study, stopped, say)? else {
+    let Some((reference, times_below)) = reference(study, stopped, say)? else {
         return Ok(None);
     };
     say("measuring errors, and writing results, pictures and report");
@@ -55,8 +57,9 @@ pub fn run(
     }
     evaluate::mark_front(&mut rows);
     let findings = Findings {
+        flip_floor: flip_floor::floor(&reference.reference),
         reference,
-        reference_good: good,
+        times_below,
         rows,
     };
     evaluate::write_maps(study, &findings)?;
@@ -108,12 +111,12 @@ fn all_runs(
     Ok(Some(records))
 }
 
-/// The reference, and whether it is good enough.
+/// The reference, and how many times its error is below the smallest one studied.
 fn reference(
     study: &mut Study,
     stopped: &dyn Fn() -> bool,
     say: &mut dyn FnMut(&str),
-) -> Result<Option<(Known, Option<bool>)>, StudyError> {
+) -> Result<Option<(Known, Option<f64>)>, StudyError> {
     let Study {
         plan,
         methods,
@@ -122,11 +125,11 @@ fn reference(
     let (method, limit) = match reference {
         ReferenceChoice::File(path) => {
             let known = Known::read(path, methods[0].job.film.crop)?;
-            let good = match known.rel_mse {
-                Some(own) => Some(own <= target(plan, methods, &known)?),
+            let times = match known.rel_mse {
+                Some(own) => Some(times_below(own, target(plan, methods, &known)?)),
                 None => None,
             };
-            return Ok(Some((known, good)));
+            return Ok(Some((known, times)));
         }
         ReferenceChoice::Made { method, limit } => (method, *limit),
     };
@@ -145,7 +148,7 @@ fn reference(
                 let now = known.rel_mse.unwrap_or(f64::INFINITY);
                 let target = target(plan, methods, &known)?;
                 if now <= target || left == Duration::ZERO {
-                    return Ok(Some((known, Some(now <= target))));
+                    return Ok(Some((known, Some(times_below(now, target)))));
                 }
                 (now, target)
             }
@@ -153,13 +156,16 @@ fn reference(
         if stopped() {
             return Ok(None);
         }
-        let n = maker.next_part(now, target);
+        let part = maker.next_part(now, target);
+        if now.is_finite() {
+            say(&what_is_missing(&maker, times_below(now, target), left));
+        }
         let before = maker.known().map_or(0.0, |k| k.seconds);
         let by = match method {
             Some(method) => method,
             None => &mut methods[best],
         };
-        maker.extend(by, n, left, stopped)?;
+        maker.extend(by, part, left, stopped)?;
         let Some(known) = maker.known() else {
             continue;
         };
@@ -171,6 +177,35 @@ fn reference(
             known.seconds
         ));
     }
+}
+
+/// Said before the reference is made better: how good it is, and what is to come.
+fn what_is_missing(maker: &Maker, times: f64, left: Duration) -> String {
+    let Some(known) = maker.known() else {
+        return String::new();
+    };
+    let own = 100.0 * known.rel_mse.unwrap_or(0.0).sqrt();
+    let left = left.as_secs_f64();
+    // Below that, the smallest error studied is only guessed.
+    if times < 1.0 {
+        return format!(
+            "reference: its error of {own:.3} % is not yet below the smallest studied; going on for {left:.0} s at most"
+        );
+    }
+    // Noise falls at least as one over the square root of samples.
+    let more = known.seconds * ((TIMES_BELOW / times).powi(2) - 1.0);
+    format!(
+        "reference: its error of {own:.3} % is {times:.1} times below the smallest studied; to be {TIMES_BELOW} times \
+         below takes some {more:.0} s more, and it has {left:.0} s"
+    )
+}
+
+/// How many times an error whose square is `own` is below the smallest one studied, `target` being what it should be.
+fn times_below(own: f64, target: f64) -> f64 {
+    if own <= 0.0 {
+        return f64::INFINITY;
+    }
+    TIMES_BELOW * (target / own).sqrt()
 }
 
 /// The unbiased method whose runs at the largest amount have the least relative variance times seconds; among
@@ -195,7 +230,7 @@ fn most_efficient(plan: &Plan, methods: &[Method]) -> Result<usize, StudyError> 
         let pictures: Vec<Picture> = pictures.collect::<Result<_, _>>()?;
         let records = runs.filter_map(|run| runs::kept(plan, &methods[m], amount, run));
         let seconds: f64 = records.map(|r| r.seconds).sum();
-        let mean = picture_of(pictures[0].width, &mean_picture(&pictures));
+        let mean = Reference::exact(picture_of(pictures[0].width, &mean_picture(&pictures)));
         let spread = Gram::of(&pictures, &mean, Weighing::Relative).squares();
         let cost = seconds * spread.iter().sum::<f64>();
         if cost < best.0 {

@@ -1,79 +1,12 @@
-"""Drives Chromium through WebDriver (W3C), by the standard library alone: see tests/report_in_browser.sh."""
+"""Opens a report in the browsers that are installed, and tries what can be pressed: see tests/report_in_browser.sh."""
 
-import base64
-import json
 import pathlib
-import socket
-import subprocess
 import sys
-import time
-import urllib.error
-import urllib.request
+
+import drivers
+from drivers import moved, pressed
 
 TAB, ENTER, END, LEFT, UP, RIGHT, DOWN = "\ue004", "\ue007", "\ue010", "\ue012", "\ue013", "\ue014", "\ue015"
-
-
-class Browser:
-    def __init__(self, dark):
-        with socket.socket() as s:
-            s.bind(("127.0.0.1", 0))
-            port = s.getsockname()[1]
-        self.base = f"http://127.0.0.1:{port}"
-        quiet = subprocess.DEVNULL
-        self.driver = subprocess.Popen(["chromedriver", f"--port={port}"], stdout=quiet, stderr=quiet)
-        self.session = None
-        args = ["--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1280,900"]
-        if dark:
-            args.append("--force-dark-mode")
-        wanted = {"browserName": "chrome", "goog:chromeOptions": {"args": args},
-                  "goog:loggingPrefs": {"browser": "ALL", "performance": "ALL"}}
-        for _ in range(100):
-            try:
-                urllib.request.urlopen(self.base + "/status", timeout=5)
-                break
-            except OSError:
-                time.sleep(0.1)
-        made = self.ask("POST", "/session", {"capabilities": {"alwaysMatch": wanted}})
-        self.session = f"/session/{made['sessionId']}"
-
-    def ask(self, method, path, body=None):
-        data = None if body is None else json.dumps(body).encode()
-        request = urllib.request.Request(self.base + path, data, {"Content-Type": "application/json"}, method=method)
-        try:
-            with urllib.request.urlopen(request, timeout=60) as answer:
-                return json.load(answer)["value"]
-        except urllib.error.HTTPError as e:
-            raise RuntimeError(e.read().decode()) from e
-
-    def post(self, path, body):
-        return self.ask("POST", self.session + path, body)
-
-    def js(self, script, *args):
-        return self.post("/execute/sync", {"script": script, "args": list(args)})
-
-    def keys(self, keys):
-        """Presses keys as a person would, at whatever has the focus."""
-        actions = [a for k in keys for a in ({"type": "keyDown", "value": k}, {"type": "keyUp", "value": k})]
-        self.post("/actions", {"actions": [{"type": "key", "id": "keyboard", "actions": actions}]})
-
-    def log(self, kind):
-        return self.post("/se/log", {"type": kind})
-
-    def screenshot(self, path):
-        # As high as the page, so that all of it is seen.
-        height = self.js("return document.documentElement.scrollHeight")
-        self.post("/window/rect", {"width": 1280, "height": min(int(height) + 150, 4000)})
-        shot = self.ask("GET", self.session + "/screenshot")
-        pathlib.Path(path).write_bytes(base64.b64decode(shot))
-
-    def close(self):
-        if self.session:
-            try:
-                self.ask("DELETE", self.session)
-            except (OSError, RuntimeError):
-                pass
-        self.driver.terminate()
-        self.driver.wait(10)
 
 
 def check(what, right):
@@ -100,17 +33,16 @@ def plots(b, results):
     tip = "return document.getElementById('tip').hidden ? '' : document.getElementById('tip').textContent"
     check("a mark with the focus shows its numbers", points[int(first)]["method"] in b.js(tip))
     if sum(p["method"] == points[int(first)]["method"] for p in drawn) > 1:
-        b.keys(RIGHT)
+        b.act(pressed(RIGHT))
         check("an arrow key goes to the next mark", b.js("return document.activeElement.dataset.point") != first)
-    b.keys(ENTER)
+    b.act(pressed(ENTER))
     now = b.js("return document.activeElement.dataset.point")
     check("Enter shows a mark's pictures", b.js("return document.getElementById('left').value") == now)
     box = b.js("const r = document.querySelector('#plot-time .mark').getBoundingClientRect();"
                "document.activeElement.blur(); scrollTo(0, scrollY + r.top - 300);"
                "const s = document.querySelector('#plot-time .mark').getBoundingClientRect();"
                "return [s.x + s.width / 2, s.y + s.height / 2]")
-    move = {"type": "pointerMove", "duration": 50, "x": int(box[0]), "y": int(box[1]), "origin": "viewport"}
-    b.post("/actions", {"actions": [{"type": "pointer", "id": "mouse", "actions": [move]}]})
+    b.act(moved(*box))
     check("hovering shows numbers", "spp" in b.js(tip))
     for measure in b.js("return [...document.getElementById('measure').options].map(o => o.value)"):
         b.js("const s = document.getElementById('measure'); s.value = arguments[0]; s.dispatchEvent(new Event('change'))", measure)
@@ -119,9 +51,9 @@ def plots(b, results):
     b.js("const s = document.getElementById('measure'); s.value = 'error'; s.dispatchEvent(new Event('change'))")
     b.js("document.querySelector('#legend button').focus()")
     before = b.js("return document.querySelectorAll('.mark').length")
-    b.keys(ENTER)
+    b.act(pressed(ENTER))
     check("the legend hides a method", b.js("return document.querySelectorAll('.mark').length") < before)
-    b.keys(ENTER)
+    b.act(pressed(ENTER))
     check("and shows it again", b.js("return document.querySelectorAll('.mark').length") == before)
 
 
@@ -132,16 +64,16 @@ def pictures(b):
     b.js("document.getElementById('slider').focus()")
     clip = "return getComputedStyle(document.getElementById('img-right')).clipPath"
     before = b.js(clip)
-    b.keys(LEFT * 5)
+    b.act(pressed(LEFT * 5))
     check("the divider moves by keyboard", b.js("return document.getElementById('slider').value") == "45" and b.js(clip) != before)
     b.js("document.getElementById('zoom').focus()")
     width = b.js("return document.getElementById('pair').offsetWidth")
-    b.keys(END)
+    b.act(pressed(END))
     check("the zoom works by keyboard", b.js("return document.getElementById('pair').offsetWidth") > width)
     b.js("const z = document.getElementById('zoom'); z.value = z.defaultValue; z.dispatchEvent(new Event('input'))")
     old = b.js("return document.getElementById('map-error').src")
     b.js("document.getElementById('map-point').focus()")
-    b.keys(DOWN)
+    b.act(pressed(DOWN))
     check("another map can be chosen by keyboard", b.js("return document.getElementById('map-error').src") != old)
 
 
@@ -156,30 +88,34 @@ def tables(b, results):
     check("the page does not scroll sideways", wide)
 
 
-def main():
-    report, shots = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2])
-    shots.mkdir(parents=True, exist_ok=True)
-    colours = []
+def try_out(kind, report, shots):
+    name, colours = kind.__name__, []
     for dark in (False, True):
-        b = Browser(dark)
+        b = kind(dark)
         try:
-            b.post("/url", {"url": report.as_uri()})
-            results = b.js("return DATA.results")
+            b.open(report.as_uri())
+            results = b.js("return JSON.parse(document.getElementById('data').textContent).results")
             colours.append(b.js("return getComputedStyle(document.body).backgroundColor"))
-            b.screenshot(shots / ("dark.png" if dark else "light.png"))
-            b.post("/window/rect", {"width": 1280, "height": 900})
+            b.screenshot(shots / f"{name.lower()}-{'dark' if dark else 'light'}.png")
             plots(b, results)
             pictures(b)
             tables(b, results)
-            wrong = [e for e in b.log("browser") if e["level"] in ("SEVERE", "WARNING")]
+            wrong = b.complaints()
             check(f"the console is silent {wrong}", not wrong)
-            asked = [json.loads(e["message"])["message"] for e in b.log("performance")]
-            urls = [m["params"]["request"]["url"] for m in asked if m["method"] == "Network.requestWillBeSent"]
-            elsewhere = [u for u in urls if not u.startswith(("data:", "file:"))]
-            check(f"nothing is asked of the network {elsewhere}", urls and not elsewhere)
+            asked = b.asked()
+            elsewhere = [u for u in asked if not u.startswith(("data:", "file:"))]
+            check(f"nothing is asked of the network {elsewhere}", asked and not elsewhere)
         finally:
             b.close()
-    check(f"dark differs from light: {colours}", colours[0] != colours[1])
+    check(f"{name}: dark differs from light: {colours}", colours[0] != colours[1])
+
+
+def main():
+    report, shots = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2])
+    shots.mkdir(parents=True, exist_ok=True)
+    for kind in drivers.here():
+        print(kind.__name__)
+        try_out(kind, report, shots)
 
 
 main()

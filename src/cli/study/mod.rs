@@ -11,6 +11,7 @@ use super::render::{pool, scene_name, watch_for_interrupt};
 use super::{Failure, Outcome};
 use crate::format::{self, Compiled, Overrides};
 use crate::study::plan::{Amount, Method, Plan, ReferenceChoice, Study, StudyError};
+use crate::study::reference::TIMES_BELOW;
 use crate::study::sweep::{self, Findings};
 use crate::study::{report, results};
 use args::SppList;
@@ -287,11 +288,23 @@ pub fn run(args: &StudyArgs, command_line: &str) -> Result<Outcome, Failure> {
     let stop = || stopped.load(Ordering::Relaxed);
     let found = pool.install(|| sweep::run(&mut study, &stop, &mut |line| eprintln!("{line}")))?;
     let Some(findings) = found else {
-        eprintln!("stopped; the same command goes on from here");
+        eprintln!("stopped: {}", kept_so_far(&study.plan.folder));
         return Ok(Outcome::Interrupted);
     };
     conclude(&study, &findings);
     Ok(Outcome::Done)
+}
+
+/// What an interrupted study leaves behind, and how to go on.
+fn kept_so_far(folder: &Path) -> String {
+    let is_run = |e: &std::fs::DirEntry| e.path().extension().is_some_and(|e| e == "exr");
+    let runs = std::fs::read_dir(folder.join("runs"))
+        .map_or(0, |entries| entries.flatten().filter(is_run).count());
+    let name = folder.display();
+    format!(
+        "{runs} finished runs and what is done of the reference are kept in {name}; the run that was interrupted is not. \
+         The same command goes on from there; results and report are written at its end"
+    )
 }
 
 /// Two methods of one name would have one name of their files too.
@@ -307,15 +320,34 @@ fn check_labels(methods: &[Method]) -> Result<(), Failure> {
     }
 }
 
-/// A line per method, and where to look.
-fn conclude(study: &Study, findings: &Findings) {
-    if let (Some(false), Some(own)) = (findings.reference_good, findings.reference.rel_mse) {
+/// What a reference that is not good enough means for the figures.
+fn warn_of_reference(findings: &Findings) {
+    let (Some(times), Some(own)) = (findings.times_below, findings.reference.rel_mse) else {
+        return;
+    };
+    if times >= TIMES_BELOW {
+        return;
+    }
+    let own = 100.0 * own.sqrt();
+    let advice = "give it a longer --reference-time or a --reference";
+    if times <= 1.0 {
         eprintln!(
-            "warning: the reference's own error of {:.2} % is less than 10 times below the smallest one studied: it is \
-             in the intervals, and falls with a longer --reference-time or a --reference",
-            100.0 * own.sqrt()
+            "warning: the reference's own error of {own:.3} % is not below the smallest one studied, which is hardly seen \
+             beside it: {advice}"
+        );
+    } else {
+        eprintln!(
+            "warning: the reference's own error of {own:.3} % is {times:.1} times below the smallest one studied, not \
+             {TIMES_BELOW}. Of the smallest relMSE as measured, {:.1} % was the reference's: it is taken off, of errors, \
+             bias and slopes, and its doubt is in their intervals; it cannot be taken off FLIP. To do better, {advice}",
+            100.0 / (1.0 + times * times)
         );
     }
+}
+
+/// A line per method, and where to look.
+fn conclude(study: &Study, findings: &Findings) {
+    warn_of_reference(findings);
     let invalid: u64 = findings
         .rows
         .iter()

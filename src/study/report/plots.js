@@ -158,7 +158,7 @@ function describe(p) {
     `error ${range(p.error, percent)}`,
     `bias ${range(p.bias, percent)}`,
     `noise ${range(p.noise, percent)}`,
-    `RMSE ${short(p.rmse.value)}, relMSE ${short(p.relmse.value)}, FLIP ${short(p.flip.value)}`,
+    `RMSE ${short(p.rmse.value)}, relMSE ${short(p.relmse.value)}, FLIP ${p.flip_resolved === false ? "≲ " : ""}${short(p.flip.value)}`,
     `${short(p.spp)} spp, ${short(p.seconds.value)} s, ${short(p.rays)} rays`,
   ].join("\n");
 }

@@ -32,10 +32,19 @@ function startTables() {
   byId("title").textContent = `${R.scene}: a study of convergence`;
   const ref = R.reference;
   const own = ref.error === null ? "whose own error is not known" : `whose own error is ${percent(ref.error)}`;
-  const enough = ref.ten_times_below === false ? " (less than 10 times below the smallest error studied)" : "";
+  const times = ref.times_below;
+  const enough = ref.error > 0 && times !== null && times !== undefined ? `, ${short(times)} times below the smallest one studied` : "";
   const from = ref.method ? `made by ${ref.method} with ${short(ref.spp)} spp` : ref.file;
   byId("facts").textContent = `luxel ${R.version}; ${R.resolution.join(" × ")} pixels, ${R.runs} runs of each setting, ` +
     `${R.threads} threads. Reference: ${from}, ${own}${enough}.`;
+
+  const warn = [];
+  if (ref.ten_times_below === false) warn.push(times > 1
+    ? `The reference's error should be 10 times below the smallest one studied. Of the smallest relMSE as measured, ${percent(1 / (1 + times * times))} was the reference's: it is taken off errors, bias and slopes, and its doubt is in their intervals.`
+    : "The reference's error is not below the smallest one studied, which is hardly seen beside it: those figures say little.");
+  if (POINTS.some((p) => p.flip_resolved === false)) warn.push(`The reference's noise alone makes a FLIP of ${short(ref.flip_floor)}, which cannot be taken off: FLIPs below three times that are marked ≲ and are not resolved.`);
+  if (ref.error === null) warn.push("The reference counts as exact, since it does not tell its own error: what it has of that is in all figures.");
+  byId("warnings").append(...warn.map((t) => make("p", { class: "warning" }, t)));
 
   const wanted = METHODS.length ? METHODS[0].forecasts.map((f) => f.wanted) : [];
   byId("findings").append(make("thead", {}, row(["method", "slope of error", "slope of noise", "bias", "bias floor from", "best efficiency",
@@ -52,7 +61,7 @@ function startTables() {
     ["memory, MiB", (p) => (p.peak_memory_bytes ? short(p.peak_memory_bytes / 1048576) : "–")],
     ["error", (p) => cell(p.error, percent)], ["bias", (p) => cell(p.bias, percent)], ["noise", (p) => cell(p.noise, percent)],
     ["brightness", (p) => cell(p.brightness, percent)], ["relMSE", (p) => cell(p.relmse, short)], ["RMSE", (p) => cell(p.rmse, short)],
-    ["FLIP", (p) => cell(p.flip, short)], ["efficiency", (p) => cell(p.efficiency, short)], ["claims held", (p) => (p.claims_held[1] ? p.claims_held.join(" of ") : "–")],
+    ["FLIP", (p) => { const c = cell(p.flip, short); return p.flip_resolved === false ? ["≲ " + c[0], ...c.slice(1)] : c; }], ["efficiency", (p) => cell(p.efficiency, short)], ["claims held", (p) => (p.claims_held[1] ? p.claims_held.join(" of ") : "–")],
     ["front", (p) => (p.front ? "yes" : "")],
   ];
   byId("table").append(make("thead", {}, row(columns.map(([name]) => name), true)),

@@ -46,7 +46,7 @@ fn moments(noise: &mut Noise, runs: usize, bias: f32, sd: f32, of_reference: f32
     let pictures: Vec<Picture> = (0..runs)
         .map(|_| noise.picture(PIXELS, wrong, sd))
         .collect();
-    let gram = Gram::of(&pictures, &reference.picture, Weighing::Absolute);
+    let gram = Gram::of(&pictures, &reference, Weighing::Absolute);
     let mean = mean_picture(&pictures);
     Moments::of(&gram, &reference, &mean, Weighing::Absolute)
 }
@@ -138,7 +138,7 @@ fn equal_pictures_have_no_error() {
         variance: Some(vec![Rgb::BLACK; 4]),
     };
     let pictures = vec![grey; 5];
-    let gram = Gram::of(&pictures, &reference.picture, Weighing::Relative);
+    let gram = Gram::of(&pictures, &reference, Weighing::Relative);
     let m = Moments::of(
         &gram,
         &reference,
@@ -168,4 +168,94 @@ fn slopes_have_honest_intervals() {
     }
     // Binomial(150, 0.95): standard deviation 2.7; three of them below the mean.
     assert!(held >= 134, "{held} of 150");
+}
+
+#[test]
+fn a_noisy_reference_does_not_bias_what_is_judged_by_it() {
+    // A reference only twice as good as one run, some of the pixels as dark as its noise: the weights of relMSE, too,
+    // are noisy then. Truth is the same study judged by the exact picture.
+    let dark = |i: usize| 0.02 + 0.03 * i as f32;
+    let exact = Reference::exact(Picture {
+        width: PIXELS,
+        height: 1,
+        pixels: (0..PIXELS).map(|i| Rgb::splat(dark(i))).collect(),
+    });
+    let of_reference = 0.025f32;
+    let mut noise = Noise(4711);
+    for weighing in [Weighing::Absolute, Weighing::Relative] {
+        for bias in [0.0, 0.04] {
+            let (mut held, mut sums, mut off) = ([0; 2], [0.0; 2], [0.0; 2]);
+            const STUDIES: usize = 400;
+            for _ in 0..STUDIES {
+                let wrong = |i: usize| dark(i) + if i % 4 < 2 { bias } else { -bias };
+                let runs: Vec<Picture> =
+                    (0..8).map(|_| noise.picture(PIXELS, wrong, 0.05)).collect();
+                let noisy = Reference {
+                    picture: noise.picture(PIXELS, dark, of_reference),
+                    variance: Some(vec![Rgb::splat(of_reference * of_reference); PIXELS]),
+                };
+                let mean = mean_picture(&runs);
+                let by =
+                    |r: &Reference| Moments::of(&Gram::of(&runs, r, weighing), r, &mean, weighing);
+                let (m, best) = (by(&noisy), by(&exact));
+                for (k, (e, best)) in [(m.mse, best.mse), (m.bias2, best.bias2)]
+                    .iter()
+                    .enumerate()
+                {
+                    sums[k] += best.value / STUDIES as f64;
+                    off[k] += (e.value - best.value) / STUDIES as f64;
+                }
+                // Truth: noise of all runs is the same, the bias squared in the mean of the weights.
+                let weights: f64 = (0..PIXELS)
+                    .map(|i| weighing.weight(f64::from(dark(i)), 0.0))
+                    .sum::<f64>()
+                    / PIXELS as f64;
+                let square = f64::from(bias).powi(2);
+                let truths = [weights * (square + 0.0025), weights * square];
+                for (k, e) in [m.mse, m.bias2].iter().enumerate() {
+                    held[k] += usize::from(e.low <= truths[k] && truths[k] <= e.high);
+                }
+            }
+            println!("{weighing:?} {bias}: held {held:?}, off {off:?} of {sums:?}");
+            for k in 0..2 {
+                // Binomial(400, 0.95): 13 is three standard deviations below the mean of 380, and little more.
+                assert!(held[k] >= 365, "{weighing:?}, bias {bias}: {held:?}");
+                // Of the error; without the reference's noise taken off it would be 25 % of it.
+                assert!(
+                    off[k].abs() < 0.02 * sums[0],
+                    "{weighing:?}, bias {bias}: {off:?} of {sums:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn few_runs_say_little_but_no_nonsense() {
+    let mut noise = Noise(9);
+    for runs in 1..=2 {
+        let m = moments(&mut noise, runs, 0.0, 0.1, 0.01);
+        for e in [m.mse, m.bias2, m.variance] {
+            assert!(
+                e.value.is_finite() && e.low == 0.0 && e.high > e.value,
+                "{runs}: {e:?}"
+            );
+        }
+        let point = crate::study::fit::FitPoint {
+            spp: 4.0,
+            seconds: 0.1,
+            runs,
+            mse: m.mse,
+            bias2: m.bias2,
+            variance: m.variance,
+        };
+        let c = crate::study::fit::Convergence::of(&[
+            point,
+            crate::study::fit::FitPoint { spp: 8.0, ..point },
+        ]);
+        if let Some(line) = c.error {
+            assert!(line.slope.value.is_finite(), "{line:?}");
+        }
+        assert!(!format!("{:?}", c.forecast(0.01)).contains("NaN"));
+    }
 }
