@@ -47,6 +47,10 @@ fn go_on(_: &str, _: &Film, _: &Stats) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
+fn is_biased(choice: &Choice) -> bool {
+    choice.trials[choice.chosen].found.as_ref().unwrap().biased
+}
+
 fn tried(choice: &Choice) -> Vec<&str> {
     let measured = choice.trials.iter().filter(|t| t.found.is_ok());
     measured.map(|t| t.options).collect()
@@ -90,14 +94,14 @@ fn light_that_an_integrator_cannot_find_keeps_it_from_being_tried() {
     let (choice, ..) = job.choose(choice.unwrap(), &work, go_on).unwrap();
     let photons = ["combined", "vcm", "sppm"].map(|name| format!("--integrator {name}"));
     assert_eq!(tried(&choice), photons);
-    assert!(choice.trials[choice.chosen].biased);
+    assert!(is_biased(&choice));
     // Nothing throws caustics: photons would only add a bias.
     let Compiled {
         mut job, choice, ..
     } = room(POINT, "diffuse");
     let (choice, ..) = job.choose(choice.unwrap(), &work, go_on).unwrap();
     assert!(tried(&choice).starts_with(&["--integrator path", "--integrator bdpt"]));
-    assert!(!choice.trials[choice.chosen].biased);
+    assert!(!is_biased(&choice));
 }
 
 /// The caustic of a small lamp, which hardly any path finds by chance, is known to be missing by those that find it.
@@ -148,7 +152,7 @@ fn a_picture_without_noise_is_no_trouble() {
     let work = Work::whole(Stop::Spp(16));
     let (choice, ..) = job.choose(choice.unwrap(), &work, go_on).unwrap();
     // All are perfect; which of them is quickest is up to the clock.
-    assert!(!choice.trials[choice.chosen].biased, "{choice:?}");
+    assert!(!is_biased(&choice), "{choice:?}");
     let json = choice.to_json().to_string();
     assert!(!json.contains("NaN"), "{json}");
 }

@@ -9,6 +9,7 @@ use luxel::render::{Identity, Metadata, Saved, Shard, Stats, Stop, Target, Work,
 use render::{camera, compile_with, scene};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// A lamp over a floor with a ball of glass, which throws a caustic.
 fn job(integrator: &str, seed: u64) -> Compiled {
@@ -38,7 +39,10 @@ fn bits(film: &Film) -> Vec<u64> {
 
 /// By way of a file.
 fn kept(job: &Compiled, work: &Work, film: &Film, stats: &Stats, name: &str) -> Saved {
-    let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("parts-{name}.exr"));
+    // Tests run side by side.
+    static COUNT: AtomicU32 = AtomicU32::new(0);
+    let count = COUNT.fetch_add(1, Ordering::Relaxed);
+    let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("parts-{name}-{count}.exr"));
     let identity = Identity::new(&job.job, work.stop, "hash");
     let image = (job.job).to_be_saved(&identity, work, film, stats, &Metadata::default());
     image.write(&path).unwrap();

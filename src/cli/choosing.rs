@@ -82,7 +82,7 @@ fn table(choice: &Choice) -> String {
         choice.trials.iter().partition(|t| t.found.is_ok());
     for trial in tried {
         let Ok(m) = &trial.found else { continue };
-        let biased = if trial.biased { " (biased)" } else { "" };
+        let biased = if m.biased { " (biased)" } else { "" };
         text += &format!(
             "{:<22} {:>8.0} {:>14.2e} {:>12.3} {:>12.2} {:>12.1e} {:>12.1} {:>14}\n",
             format!("{}{biased}", short(trial.options)),
@@ -101,7 +101,8 @@ fn table(choice: &Choice) -> String {
         }
     }
     let chosen = choice.options();
-    let biased = match choice.trials[choice.chosen].biased {
+    let found = &choice.trials[choice.chosen].found;
+    let biased = match found.as_ref().is_ok_and(|m| m.biased) {
         true => "; its bias vanishes as samples are added, and no error that is printed holds it",
         false => "",
     };
