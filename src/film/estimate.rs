@@ -61,7 +61,11 @@ impl Film {
 
     /// Degrees of freedom of a pixel's standard error.
     pub fn freedom(&self) -> u32 {
-        self.replicates.saturating_sub(1)
+        match self.tiles.first().map(|tile| &tile.taken) {
+            // Each half has a mean of its own.
+            Some(super::Taken::Halves(_)) => self.replicates.saturating_sub(2),
+            _ => self.replicates.saturating_sub(1),
+        }
     }
 
     /// The standard error of every pixel, row by row: the square root of the variance of its mean.
@@ -180,7 +184,10 @@ impl Tile {
     /// what is between them counts as much as they do.
     fn scatter(&self, pixel: usize, [c, d]: [usize; 2], spreads: &[Spread; 3]) -> f64 {
         let all = self.replicates as usize;
-        let dof = (all - 1) as f64;
+        let dof = match self.taken {
+            super::Taken::Range(_) => all - 1,
+            super::Taken::Halves(_) => all - 2,
+        } as f64;
         let product = spreads[c].variance * spreads[d].variance;
         let square = if c == d || all < 4 {
             // Of so few replicates nothing tells how far channels go together: all the way at worst. The square of a
@@ -241,6 +248,14 @@ impl Tile {
             third += d * d * d;
         }
         let sigma2 = second / (r - 1.0);
+        let mut variance = sigma2 / n;
+        if let (super::Taken::Halves(counts), 1) = (&self.taken, step) {
+            // How many samples a half has was decided by what the other showed: a half that shows less noise than there
+            // is leaves the other with few samples. Its own spread knows nothing of that.
+            let of = |half: usize| self.spread_over(pixel, c, half, 2).variance;
+            debug_assert!(counts.iter().all(|n| *n > 0));
+            variance = 0.25 * (of(0) + of(1));
+        }
         // Third central moment of the mean over n, from that of the replicates scaled by sqrt(n/r).
         let third = if r > 2.0 {
             third * r / ((r - 1.0) * (r - 2.0))
@@ -250,7 +265,7 @@ impl Tile {
         let covariance = third / (r.sqrt() * n.powf(1.5));
         Spread {
             mean,
-            variance: sigma2 / n,
+            variance,
             covariance,
         }
     }
