@@ -14,7 +14,7 @@ mod taken;
 pub use estimate::{ErrorEstimate, TileError, student_t_95};
 pub use exact::Sum;
 pub use filter::{Filter, FilterSampler};
-pub use glance::{FEWEST, Glance};
+pub use glance::{FEWEST, Glance, PixelGlance};
 pub use parts::PartMoments;
 pub use planes::{PlaneError, Planes};
 pub use splat::{Splat, SplatBand, SplatBuffer};

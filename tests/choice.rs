@@ -87,13 +87,14 @@ fn the_picture_is_that_of_the_one_that_was_chosen() {
 
 #[test]
 fn light_that_an_integrator_cannot_find_keeps_it_from_being_tried() {
-    let work = Work::whole(Stop::Spp(16));
+    // So many that all trials are short beside it.
+    let work = Work::whole(Stop::Spp(4096));
     let Compiled {
         mut job, choice, ..
     } = room(POINT, "dielectric");
     let (choice, ..) = job.choose(choice.unwrap(), &work, go_on).unwrap();
     let photons = ["combined", "vcm", "sppm"].map(|name| format!("--integrator {name}"));
-    assert_eq!(tried(&choice), photons);
+    assert_eq!(tried(&choice), photons, "{choice:?}");
     assert!(is_biased(&choice));
     // Nothing throws caustics: photons would only add a bias.
     let Compiled {
@@ -122,7 +123,7 @@ fn light_that_hardly_any_sample_finds_counts() {
     // By its own samples alone it would seem to be the best one.
     assert!(path.efficiency() > bdpt.efficiency(), "{choice:?}");
     // Its caustic makes a good part of the light on the floor below the ball.
-    assert!(path.missed > 1e-3 && bdpt.missed < 1e-4, "{choice:?}");
+    assert!(path.missed > 3e-4 && bdpt.missed < 1e-4, "{choice:?}");
     assert_ne!(choice.options(), "--integrator path");
 }
 

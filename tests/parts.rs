@@ -223,3 +223,33 @@ fn files_that_hold_no_part_of_a_picture_are_told() {
     }
     std::fs::remove_file(&path).unwrap();
 }
+
+#[test]
+fn a_part_whose_sums_are_damaged_is_refused() {
+    let job = job("path", 0);
+    let work = Work::whole(Stop::Spp(8));
+    let (film, stats) = job.job.render(work.stop, go).unwrap();
+    let identity = Identity::new(&job.job, work.stop, "hash");
+    let image = (job.job).to_be_saved(&identity, &work, &film, &stats, &Metadata::default());
+    let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("parts-damaged.exr");
+    image.write(&path).unwrap();
+    let whole = std::fs::read(&path).unwrap();
+    let (mut refused, mut same) = (0, 0);
+    for i in 0..60 {
+        let mut bytes = whole.clone();
+        let at = whole.len() * (i + 40) / 100;
+        bytes[at] ^= 0x40;
+        std::fs::write(&path, &bytes).unwrap();
+        match Saved::read(&path) {
+            Err(_) => refused += 1,
+            // It is the picture that is damaged, which is made anew of the sums.
+            Ok(saved) => {
+                assert_eq!(saved.film.planes(), film.planes());
+                same += 1;
+            }
+        }
+    }
+    // The sums are most of the file.
+    assert!(refused > 3 * same, "{refused} refused, {same} the same");
+    std::fs::remove_file(&path).unwrap();
+}

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::time::{Duration, SystemTime};
 
 fn folder(name: &str) -> PathBuf {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("shards-{name}"));
@@ -40,7 +41,11 @@ fn a_shard_that_is_there_is_not_rendered_again() {
 
     // As if killed in the middle of writing, and as if the shard were not yet written when that happened.
     luxel(&folder, &format!("{task} 2/2 -o 2.exr"));
-    fs::write(folder.join(".luxel-1-0.tmp"), "half of a shard").unwrap();
+    let forgotten = folder.join(".luxel-1-0.tmp");
+    fs::write(&forgotten, "half of a shard").unwrap();
+    let file = fs::File::options().write(true).open(&forgotten).unwrap();
+    file.set_modified(SystemTime::now() - Duration::from_secs(3600))
+        .unwrap();
     fs::rename(folder.join("2.exr"), folder.join("2.checkpoint.exr")).unwrap();
     let from = luxel(&folder, &format!("{task} 2/2 -o 2.exr"));
     assert!(
@@ -76,8 +81,17 @@ fn shards_of_other_pictures_are_left_as_they_are() {
             "--spp 8 --shard 1/2",
             "end: 6 samples per pixel there, 8 samples per pixel here",
         ),
-        ("--spp 6 --shard 2/2", "it is of another shard"),
-        ("--spp 6 --shard 1/3", "it is of another shard"),
+        ("--spp 6 --shard 2/2", "it is shard 1/2"),
+        ("--spp 6 --shard 1/3", "it is shard 1/2"),
+        ("--spp 6", "it is shard 1/2"),
+        (
+            "--spp 6 --shard 1/2 --integrator bdpt",
+            "integrator: path there, bdpt here",
+        ),
+        (
+            "--spp 6 --shard 1/2 --max-depth 3",
+            "the settings of the integrator are others",
+        ),
     ] {
         let refused = luxel(&folder, &format!("{task} {other}"));
         assert_eq!(refused.status.code(), Some(1), "{other}");
@@ -87,6 +101,14 @@ fn shards_of_other_pictures_are_left_as_they_are() {
         assert!(said(&refused).contains(&expected), "{}", said(&refused));
         assert!(written == fs::read(folder.join("1.exr")).unwrap());
     }
+    let over = luxel(&folder, "merge 1.exr -o 1.exr");
+    assert_eq!(over.status.code(), Some(2));
+    assert!(
+        said(&over).contains("would replace one of the shards"),
+        "{}",
+        said(&over)
+    );
+    assert!(written == fs::read(folder.join("1.exr")).unwrap());
     // Whoever does not ask to go on renders anew.
     let anew = luxel(
         &folder,

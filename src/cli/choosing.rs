@@ -29,11 +29,14 @@ pub(super) fn goes_on(
         ))
     };
     let hash = desc.content_hash().map_err(unread)?;
-    for spec in candidates.iter().filter_map(|c| c.spec.as_ref().ok()) {
+    for candidate in candidates {
+        let Ok(spec) = &candidate.spec else { continue };
         job.integrator = spec.clone();
         let identity = Identity::new(job, work.stop, &hash);
         if identity.difference(&saved.identity).is_none() {
-            return Ok(true);
+            let options = candidate.options;
+            eprintln!("nothing is chosen: the checkpoint was rendered with {options}");
+            break;
         }
     }
     Ok(true)

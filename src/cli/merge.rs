@@ -27,6 +27,17 @@ pub fn run(args: &MergeArgs, command_line: &str) -> Result<Outcome, Failure> {
         );
         return Err(Failure::Usage(what));
     }
+    let same = |a: &PathBuf, b: &PathBuf| match (a.canonicalize(), b.canonicalize()) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => false,
+    };
+    if let Some(shard) = (args.shards.iter()).find(|s| args.output.iter().any(|o| same(o, s))) {
+        let what = format!(
+            "-o {}: this would replace one of the shards: choose another name",
+            shard.display()
+        );
+        return Err(Failure::Usage(what));
+    }
     args.output.iter().try_for_each(Image::check_target)?;
     let read = |path: &PathBuf| {
         let name = path.display().to_string();

@@ -346,7 +346,10 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
     // A picture that was interrupted, or ran out of time, may be gone on with. It is written already: what fails
     // now loses nothing.
     let is_late = |target: &Target| !job.is_good_enough(&film, target);
-    match interrupted || args.target_error.as_ref().is_some_and(is_late) {
+    // Who stopped the choice of an integrator made none.
+    let is_chosen = choice.as_ref().is_none_or(|choice| !choice.stopped);
+    let may_go_on = interrupted || args.target_error.as_ref().is_some_and(is_late);
+    match may_go_on && is_chosen {
         true => {
             let warning = checkpoints.keep(&film, &stats);
             warning.iter().for_each(|w| progress.warn(w));
@@ -359,16 +362,24 @@ pub fn run(args: &RenderArgs, command_line: &str) -> Result<Outcome, Failure> {
     })
 }
 
-/// First Ctrl-C: finish the pass, or whatever the `work` is made of, and write. Second: end at once.
+/// First Ctrl-C: finish the pass, or whatever the `work` is made of, and write. Second: end at once; but not in the same
+/// moment, since programs that end others may signal a process and then its whole group.
 pub(super) fn watch_for_interrupt(
     stopped: &Arc<AtomicBool>,
     work: &'static str,
 ) -> Result<(), Failure> {
+    const SAME_MOMENT: Duration = Duration::from_millis(500);
     let flag = Arc::clone(stopped);
+    let mut first: Option<Instant> = None;
     let handler = move || {
-        if flag.swap(true, Ordering::Relaxed) {
+        if first.is_some_and(|first| first.elapsed() > SAME_MOMENT) {
             std::process::exit(130);
         }
+        flag.store(true, Ordering::Relaxed);
+        if first.is_some() {
+            return;
+        }
+        first = Some(Instant::now());
         eprintln!(
             "\nstopping after this {work} and writing what is done; press Ctrl-C again to end at once"
         );

@@ -8,7 +8,7 @@ use super::render::parse_duration;
 use crate::film::Film;
 use crate::format::SceneDesc;
 use crate::image_io::Image;
-use crate::render::{Identity, Job, Metadata, Saved, Stats, Work};
+use crate::render::{Identity, Job, Metadata, Saved, Shard, Stats, Work};
 use std::sync::OnceLock;
 
 /// Time between two checkpoints; `None`: there are none.
@@ -118,7 +118,8 @@ impl<'a> Checkpoints<'a> {
         self.exists = self.path.exists();
         let saved = if self.exists {
             self.read(&self.path)?
-        } else if work.shard.is_some() && self.output.exists() {
+        } else if Saved::is_one(self.output) {
+            // Without --shard it is refused, not replaced.
             self.read(self.output)?
         } else {
             let shown = self.path.display();
@@ -141,7 +142,10 @@ impl<'a> Checkpoints<'a> {
             return Err(wrong(what));
         }
         if saved.shard != self.of.work.shard {
-            return Err(wrong("it is of another shard".to_string()));
+            return Err(wrong(match saved.shard {
+                Some(Shard { number, of }) => format!("it is shard {number}/{of}"),
+                None => "it is of the whole picture, not of a shard".to_string(),
+            }));
         }
         match saved.is_complete() {
             true => eprintln!("{shown} is complete: nothing is left to render"),

@@ -1,17 +1,23 @@
 //! What few samples say of the noise of an estimator: before each replicate has some.
 
-use super::{Film, Tile};
+use super::{Film, Sum, Tile};
 
 /// What is known of a tile.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Glance {
     /// Mean over its pixels and their channels.
     pub mean: f64,
     /// Variance of that mean.
     pub variance: f64,
-    /// Mean over its pixels and their channels of the variance of one sample.
-    pub of_sample: f64,
-    pub pixels: f64,
+    pub pixels: Vec<PixelGlance>,
+}
+
+/// What is known of a pixel: means over its channels.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PixelGlance {
+    pub mean: f32,
+    /// Variance of one sample.
+    pub of_sample: f32,
 }
 
 /// Replicates that must have samples.
@@ -20,28 +26,27 @@ pub const FEWEST: u32 = 2;
 impl Film {
     /// What there is to see of each tile; `None` where too few replicates have samples.
     pub fn glance(&self) -> Option<Vec<Glance>> {
-        let seen: Option<Vec<[Glance; 2]>> = self.tiles.iter().map(Tile::glance).collect();
+        let seen: Option<Vec<(Glance, f64)>> = self.tiles.iter().map(Tile::glance).collect();
         let seen = seen?;
         // The spread of a tile's own mean is known by few replicates, that of its pixels by many pixels: but these err
         // alike where they share photons. How much alike is told by all tiles together.
-        let sum = |i: usize| seen.iter().map(|g| g[i].variance).sum::<f64>();
-        let [alone, together] = [sum(0), sum(1)];
-        let alike = if alone > 0.0 {
-            (together / alone).max(1.0)
-        } else {
-            1.0
+        let alone: f64 = seen.iter().map(|(glance, _)| glance.variance).sum();
+        let together: f64 = seen.iter().map(|(_, variance)| variance).sum();
+        let alike = match alone > 0.0 {
+            true => (together / alone).max(1.0),
+            false => 1.0,
         };
-        let glance = |[by_pixels, _]: &[Glance; 2]| Glance {
+        let glance = |(by_pixels, _): (Glance, f64)| Glance {
             variance: by_pixels.variance * alike,
-            ..*by_pixels
+            ..by_pixels
         };
-        Some(seen.iter().map(glance).collect())
+        Some(seen.into_iter().map(glance).collect())
     }
 }
 
 impl Tile {
-    /// With the variance of the mean by that of its pixels, as if they were independent; and by that of the mean itself.
-    fn glance(&self) -> Option<[Glance; 2]> {
+    /// With the variance of the mean by that of its pixels, as if they were independent; and the same by the mean itself.
+    fn glance(&self) -> Option<(Glance, f64)> {
         let all = self.replicates as usize;
         let n_of = |r: usize| self.taken.of_replicate(r, all) as f64;
         let filled: Vec<usize> = (0..all).filter(|r| n_of(*r) > 0.0).collect();
@@ -56,26 +61,30 @@ impl Tile {
             let squares: f64 = filled.iter().map(square).sum();
             [mean, squares / (filled.len() as f64 - 1.0)]
         };
-        let pixels = f64::from(self.width * self.height);
-        let (mut of_sample, mut of_mean) = (0.0, 0.0);
+        let count = f64::from(self.width * self.height);
+        let mut of_mean = 0.0;
         let mut of_tile = vec![0.0; all];
-        for sums in self.rgb.chunks(all) {
+        let pixel = |sums: &[[Sum; 3]]| {
             let gray = |r: usize| sums[r].iter().map(|sum| sum.value()).sum::<f64>() / 3.0;
             let of_channel = |c: usize| sigma2(&|r| sums[r][c].value())[1];
-            of_sample += (0..3).map(of_channel).sum::<f64>() / (3.0 * pixels);
-            of_mean += sigma2(&gray)[1] / (pixels * pixels);
+            let [mean, variance] = sigma2(&gray);
+            of_mean += variance / (count * count);
             for (r, sum) in of_tile.iter_mut().enumerate() {
-                *sum += gray(r) / pixels;
+                *sum += gray(r) / count;
             }
-        }
+            PixelGlance {
+                mean: mean as f32,
+                of_sample: ((0..3).map(of_channel).sum::<f64>() / 3.0) as f32,
+            }
+        };
+        let pixels = self.rgb.chunks(all).map(pixel).collect();
         let [mean, variance] = sigma2(&|r| of_tile[r]);
-        let glance = |variance: f64| Glance {
+        let glance = Glance {
             mean,
-            variance: variance / n,
-            of_sample,
+            variance: of_mean / n,
             pixels,
         };
-        Some([glance(of_mean), glance(variance)])
+        Some((glance, variance / n))
     }
 }
 
@@ -122,7 +131,11 @@ mod tests {
                 };
                 // Of a uniform number: 1/12. Its estimate by 80 independent rows of 2 samples, the fewest there are, has
                 // a standard error of 0.13 of itself.
-                let of_sample = 12.0 * mean(&|g| g.of_sample);
+                let of_sample = 12.0
+                    * mean(&|g| {
+                        let sum: f32 = g.pixels.iter().map(|p| p.of_sample).sum();
+                        f64::from(sum) / g.pixels.len() as f64
+                    });
                 assert!((of_sample - 1.0).abs() < 0.4, "{samples} {of_sample}");
                 // Of the mean of so many independent numbers.
                 let of_mean = 12.0 * together * samples as f64 * mean(&|g| g.variance);

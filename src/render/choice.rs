@@ -6,9 +6,8 @@
 //! as if it had been asked for by name.
 //!
 //! Two things that the spread of few samples does not show are looked at. Light that hardly any sample finds: where
-//! another integrator finds significantly more of it than n samples do, so much is missing from them. How rarely they find
-//! it is not known: it may come with the next sample, or never, so the squared error δ² that its absence makes is taken to
-//! fall as √(n / N) up to sample N, which is between both. And the slower way down where photons are merged: as their radius
+//! another integrator finds significantly more of it, so much is missing. How rarely it is found is not known, only that it
+//! is very bright then, so the squared error that its absence makes is not taken to fall at all. And the slower way down where photons are merged: as their radius
 //! shrinks by default, variance falls as N^-3/4 and squared bias as N^-1/2 (Knaus & Zwicker 2011), in place of N^-1, so N^-2/3
 //! is taken for both.
 
@@ -18,7 +17,7 @@ use std::time::Instant;
 use serde_json::{Value, json};
 
 use super::{Job, RenderError, Stats, Stop, Work};
-use crate::film::{FEWEST, Film, Glance};
+use crate::film::{FEWEST, Film, Glance, PixelGlance};
 use crate::transport::IntegratorSpec;
 use crate::transport::candidates::Candidate;
 
@@ -26,7 +25,7 @@ use crate::transport::candidates::Candidate;
 /// take at most, beyond so many seconds.
 const SHARE: f64 = 0.02;
 const MOST: f64 = 0.1;
-const SHORT: f64 = 0.5;
+const SHORT: f64 = 0.1;
 /// Samples of each pixel that say enough.
 const ENOUGH: f64 = 16.0;
 /// Samples after which the relMSE of merged photons has begun to fall more slowly. Measured in the built-in scene: after
@@ -78,20 +77,16 @@ impl Measured {
             true => (samples / SLOW_FROM).cbrt().max(1.0),
             false => 1.0,
         };
-        let missed = self.missed * (self.samples / samples).sqrt().min(1.0);
-        slower * (self.relmse / samples + missed)
+        slower * self.relmse / samples + self.missed
     }
 
-    /// Samples until that relMSE; one, where there is no error.
+    /// Samples until that relMSE; one, where there is no error. What misses light never gets below it, but what is missed
+    /// is not known so well that it should decide alone: it is held to take four times as long where it is as large as what
+    /// is wanted, and the more the larger it is.
     fn until(&self, wanted: f64) -> f64 {
-        // With x = 1/√N: relmse x² + missed √n x = wanted.
-        let half = 0.5 * self.missed * self.samples.sqrt();
-        let x = wanted / (half + (half * half + self.relmse * wanted).sqrt());
-        let n = match x > 0.0 {
-            true => (1.0 / (x * x)).max(1.0),
-            false => 1.0,
-        };
-        // Light that was missed is as good as none where photons are merged.
+        let wanted = wanted.max(f64::MIN_POSITIVE);
+        let late = (1.0 + self.missed / wanted).powi(2);
+        let n = (self.relmse / wanted * late).max(1.0);
         match self.biased {
             true => n * (n / SLOW_FROM).sqrt().max(1.0),
             false => n,
@@ -105,6 +100,8 @@ pub struct Choice {
     pub trials: Vec<Trial>,
     /// Number of the one that was chosen.
     pub chosen: usize,
+    /// Whether the trials were stopped before all were made.
+    pub stopped: bool,
 }
 
 impl Choice {
@@ -161,10 +158,11 @@ impl Flown {
 
     /// relMSE of one sample, by its own means.
     fn relmse(&self) -> Option<f64> {
-        let glance = self.glance.as_ref()?;
-        Some(mean_over(glance, |g| {
-            g.of_sample / (g.mean * g.mean + FLOOR)
-        }))
+        let pixels = self.glance.as_ref()?.iter().flat_map(|g| &g.pixels);
+        let relative =
+            |p: &PixelGlance| f64::from(p.of_sample) / (f64::from(p.mean).powi(2) + FLOOR);
+        let (sum, n) = pixels.fold((0.0, 0.0), |(sum, n), p| (sum + relative(p), n + 1.0));
+        Some(sum / f64::max(n, 1.0))
     }
 
     /// Seconds for the picture that `work` asks for.
@@ -186,12 +184,6 @@ fn pixels(film: &Film) -> f64 {
     f64::from(film.window().width) * f64::from(film.window().height)
 }
 
-/// Mean over the pixels of all tiles.
-fn mean_over(glance: &[Glance], value: impl Fn(&Glance) -> f64) -> f64 {
-    let pixels: f64 = glance.iter().map(|g| g.pixels).sum();
-    glance.iter().map(|g| g.pixels * value(g)).sum::<f64>() / pixels.max(1.0)
-}
-
 impl Job {
     /// Tries `candidates`, and makes the best of them the job's integrator. What it has rendered of `work` on trial is
     /// to be gone on with by [`Job::go_on`]. `on_pass` sees every pass of every trial, with the options that ask for
@@ -207,7 +199,10 @@ impl Job {
     ) -> Result<(Choice, Film, Stats), RenderError> {
         let start = Instant::now();
         let mut stopped = false;
-        let mut whole = None;
+        let mut whole = match work.stop {
+            Stop::Time(limit) => Some(limit.as_secs_f64()),
+            Stop::Spp(_) | Stop::Error { .. } => None,
+        };
         let mut trials: Vec<Trial> = Vec::new();
         let mut flown: Vec<Option<Flown>> = Vec::new();
         for Candidate { options, spec } in candidates {
@@ -216,7 +211,8 @@ impl Job {
                 Ok(_) if stopped => Err("it was stopped before".to_string()),
                 Ok(spec) => {
                     self.integrator = spec;
-                    self.fly(work, whole, |film, stats| {
+                    let is_first = flown.iter().all(Option::is_none);
+                    self.fly(work, whole, is_first, |film, stats| {
                         let flow = on_pass(options, film, stats);
                         stopped |= flow.is_break();
                         flow
@@ -234,9 +230,17 @@ impl Job {
         }
         judge(&mut trials, &flown, work);
         let Some(chosen) = best(&trials, &flown) else {
-            return Err(RenderError::NoChoice(Choice { trials, chosen: 0 }));
+            return Err(RenderError::NoChoice(Choice {
+                trials,
+                chosen: 0,
+                stopped,
+            }));
         };
-        let choice = Choice { trials, chosen };
+        let choice = Choice {
+            trials,
+            chosen,
+            stopped,
+        };
         let Some(winner) = flown.swap_remove(chosen) else {
             return Err(RenderError::NoChoice(choice));
         };
@@ -251,12 +255,13 @@ impl Job {
         Ok((choice, winner.film, stats))
     }
 
-    /// Tries the job's integrator for as long as a trial may take in a picture of `whole` seconds, if that is known: then
-    /// the first trial is over. Why it is given up, if it is.
+    /// Tries the job's integrator for as long as a trial may take in a picture of `whole` seconds, if that is known; the
+    /// first takes as long as it needs, for something has to be known. Why it is given up, if it is.
     fn fly(
         &self,
         work: &Work,
         whole: Option<f64>,
+        is_first: bool,
         mut on_pass: impl FnMut(&Film, &Stats) -> ControlFlow<()>,
     ) -> Result<Flown, String> {
         let film = self.film_for(work);
@@ -266,27 +271,33 @@ impl Job {
         let mut stats = Stats::default();
         stats.phases.setup = start.elapsed().as_secs_f64();
         stats.seconds = stats.phases.setup;
-        let share = SHARE * whole.unwrap_or(0.0);
-        let most = (MOST * whole.unwrap_or(0.0)).max(SHORT);
         let needed = f64::from(film.replicates().min(FEWEST));
+        // Seconds or samples, whichever come first.
+        let share = whole.map_or(f64::INFINITY, |whole| SHARE * whole);
+        let enough = match (whole, work.stop) {
+            (None, Stop::Spp(n)) => (SHARE * n as f64).clamp(needed, ENOUGH),
+            _ => ENOUGH,
+        };
+        let most = match (is_first, whole) {
+            (false, Some(whole)) => (MOST * whole).max(SHORT),
+            _ => f64::INFINITY,
+        };
         let mut given_up = None;
         let pass = |film: &Film, stats: &Stats| {
             let flow = on_pass(film, stats);
             let taken = film.samples() as f64 / pixels(film);
-            // The first may take as long as it needs: something has to be known.
             let expected = stats.phases.radiosity
                 + (stats.seconds - stats.phases.radiosity) * needed / taken.max(1.0);
-            given_up = match (whole, &stats.solving) {
-                (Some(_), Some(_)) if stats.seconds > most => {
-                    Some("solving for radiosity takes too long for such a picture".to_string())
-                }
-                (Some(_), None) if taken < needed && expected > most => Some(format!(
+            if stats.solving.is_some() {
+                given_up = (stats.seconds > most)
+                    .then(|| "solving for radiosity takes too long for such a picture".to_string());
+            } else if taken < needed && expected > most {
+                given_up = Some(format!(
                     "{needed} samples would take {expected:.1} s, too long for such a picture"
-                )),
-                _ => None,
-            };
-            let enough = taken >= needed && (stats.seconds >= share.max(SHORT) || taken >= ENOUGH);
-            match given_up.is_some() || enough {
+                ));
+            }
+            let seen = taken >= needed && (stats.seconds >= share || taken >= enough);
+            match given_up.is_some() || seen {
                 true => ControlFlow::Break(()),
                 false => flow,
             }
@@ -309,29 +320,49 @@ impl Job {
     }
 }
 
+/// Why nothing was found of what was tried.
+const UNTOLD: &str = "so few samples do not tell its error";
+
 /// Fills in what was found.
 fn judge(trials: &mut [Trial], flown: &[Option<Flown>], work: &Work) {
     let seen: Vec<&[Glance]> = (flown.iter().flatten())
         .filter_map(|f| f.glance.as_deref())
         .collect();
     let Some(tiles) = seen.first().map(|s| s.len()) else {
+        let untold = trials
+            .iter_mut()
+            .zip(flown)
+            .filter(|(_, flown)| flown.is_some());
+        untold.for_each(|(trial, _)| trial.found = Err(UNTOLD.to_string()));
         return;
     };
-    // What all errors are relative to.
-    let mean = |i: usize| seen.iter().map(|s| s[i].mean).sum::<f64>() / seen.len() as f64;
-    let scale: Vec<f64> = (0..tiles)
-        .map(|i| 1.0 / (mean(i).powi(2) + FLOOR))
-        .collect();
-    let weighted = |glance: &[Glance], value: &dyn Fn(usize) -> f64| {
-        let all: f64 = glance.iter().map(|g| g.pixels).sum();
-        let sum: f64 = (0..tiles)
-            .map(|i| glance[i].pixels * scale[i] * value(i))
-            .sum();
-        sum / all.max(1.0)
+    // What all errors are relative to: the same for all, so that none is better for finding the picture brighter.
+    let count = seen.len() as f64;
+    let scale = |mean: f64| 1.0 / (mean.powi(2) + FLOOR);
+    let of_tile = |i: usize| scale(seen.iter().map(|s| s[i].mean).sum::<f64>() / count);
+    let of_pixel = |i: usize, p: usize| {
+        scale(
+            seen.iter()
+                .map(|s| f64::from(s[i].pixels[p].mean))
+                .sum::<f64>()
+                / count,
+        )
+    };
+    let pixels: f64 = seen[0].iter().map(|g| g.pixels.len() as f64).sum();
+    let relmse = |glance: &[Glance]| {
+        let of = |(i, tile): (usize, &Glance)| {
+            let of =
+                |(p, pixel): (usize, &PixelGlance)| f64::from(pixel.of_sample) * of_pixel(i, p);
+            tile.pixels.iter().enumerate().map(of).sum::<f64>()
+        };
+        glance.iter().enumerate().map(of).sum::<f64>() / pixels
     };
     for (trial, flown) in trials.iter_mut().zip(flown) {
         let Some((flown, glance)) = flown.as_ref().and_then(|f| Some((f, f.glance.as_ref()?)))
         else {
+            if flown.is_some() {
+                trial.found = Err(UNTOLD.to_string());
+            }
             continue;
         };
         let missing = |i: usize| {
@@ -340,12 +371,13 @@ fn judge(trials: &mut [Trial], flown: &[Option<Flown>], work: &Work) {
                 let other = &other[i];
                 other.mean - own.mean - SIGNIFICANT * (own.variance + other.variance).sqrt()
             };
-            seen.iter().map(excess).fold(0.0, f64::max).powi(2)
+            let excess = seen.iter().map(excess).fold(0.0, f64::max);
+            own.pixels.len() as f64 * excess.powi(2) * of_tile(i)
         };
         trial.found = Ok(Measured {
             samples: flown.samples(),
-            relmse: weighted(glance, &|i| glance[i].of_sample),
-            missed: weighted(glance, &missing),
+            relmse: relmse(glance),
+            missed: (0..tiles).map(missing).sum::<f64>() / pixels,
             seconds: flown.seconds(),
             biased: flown.spec.biased(),
             prepared: flown.prepared(),
@@ -382,11 +414,11 @@ mod tests {
 
     #[test]
     fn samples_until_an_error_are_those_after_which_it_is_reached() {
-        for (biased, missed) in [(false, 0.0), (false, 0.3), (true, 0.0)] {
+        for biased in [false, true] {
             let measured = Measured {
                 samples: 4.0,
                 relmse: 2.0,
-                missed,
+                missed: 0.0,
                 seconds: 1.0,
                 biased,
                 prepared: 0.0,
@@ -394,10 +426,7 @@ mod tests {
             };
             for n in [4.0, 30.0, 1000.0, 1e6] {
                 let again = measured.until(measured.after(n));
-                assert!(
-                    (again / n - 1.0).abs() < 1e-9,
-                    "{biased} {missed} {n}: {again}"
-                );
+                assert!((again / n - 1.0).abs() < 1e-9, "{biased} {n}: {again}");
             }
         }
     }

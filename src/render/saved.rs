@@ -12,11 +12,12 @@ use serde_json::{Value, json};
 use super::{Job, Metadata, Recipe, Shard, Stats, Stop, Work};
 use crate::film::{Film, Planes, Taken, Window};
 use crate::image_io::{Channel, Image, Layer, Samples};
+use crate::transport::{Indirect, IntegratorSpec};
 
 /// Name of the layer that holds the film.
 const STATE: &str = "state";
 /// Of the way that all this is written.
-const FORMAT: u64 = 1;
+const FORMAT: u64 = 2;
 
 /// All that determines a picture, in words that can be compared and shown.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -31,7 +32,16 @@ impl Identity {
         let until = match stop {
             Stop::Spp(n) => format!("{n} samples per pixel"),
             Stop::Time(_) => "a time".to_string(),
-            Stop::Error { target, .. } => format!("{target:?}"),
+            Stop::Error { target, .. } => {
+                let pixels = target
+                    .quantile
+                    .map(|q| format!(" in {} % of the pixels", 100.0 * q));
+                format!(
+                    "an error of {} %{}",
+                    100.0 * target.error,
+                    pixels.unwrap_or_default()
+                )
+            }
         };
         let crop = &job.film.crop;
         let settings = [
@@ -54,9 +64,10 @@ impl Identity {
             ),
             ("sampler", job.sampler.name().to_string()),
             ("seed", job.seed.to_string()),
+            ("integrator", label(&job.integrator)),
             // A solution that is known already changes nothing.
             (
-                "integrator",
+                "settings of the integrator",
                 format!("{:?}", job.integrator.clone().with_solution(None)),
             ),
             ("layers", format!("{:?}", job.aovs)),
@@ -73,14 +84,22 @@ impl Identity {
     pub fn difference(&self, other: &Identity) -> Option<String> {
         let differs = |(a, b): &(&(String, String), &(String, String))| a != b;
         let (a, b) = self.settings.iter().zip(&other.settings).find(differs)?;
-        let short = |s: &str| match s.char_indices().nth(60) {
-            Some((end, _)) => format!("{} ...", &s[..end]),
-            None => s.to_string(),
-        };
-        Some(match a.0 == "scene" {
-            true => "the scene, or a file that it names, is another".to_string(),
-            false => format!("{}: {} there, {} here", a.0, short(&b.1), short(&a.1)),
+        Some(match a.0.as_str() {
+            "scene" => "the scene, or a file that it names, is another".to_string(),
+            // These are compared by what the program knows of them, which is nothing to read.
+            "film" => "filter or format of the film are others".to_string(),
+            name @ ("settings of the integrator" | "layers") => format!("the {name} are others"),
+            name => format!("{name}: {} there, {} here", b.1, a.1),
         })
+    }
+}
+
+/// What an integrator is called, with the use that it makes of radiosity.
+fn label(integrator: &IntegratorSpec) -> String {
+    let name = integrator.name();
+    match integrator.cache().map(|cache| cache.indirect) {
+        None | Some(Indirect::None) => name.to_string(),
+        Some(indirect) => format!("{name} --indirect {}", indirect.name()),
     }
 }
 
@@ -113,6 +132,8 @@ struct Head {
     /// First sample and the one behind the last; `None` where tiles differ.
     samples: Option<[u64; 2]>,
     goal: u64,
+    /// Of all planes of the film.
+    checksum: String,
     stats: Stats,
 }
 
@@ -129,6 +150,7 @@ impl Job {
         let recipe = self.recipe();
         let mut image = recipe.picture(film, stats, metadata);
         let window = film.window();
+        let planes = film.planes();
         let head = Head {
             format: FORMAT,
             identity: identity.clone(),
@@ -141,6 +163,7 @@ impl Job {
             parts: film.parts(),
             samples: film.range().map(|r| [r.start, r.end]),
             goal: film.goal(),
+            checksum: checksum(&planes),
             stats: stats.clone(),
             recipe,
         };
@@ -156,13 +179,21 @@ impl Job {
         };
         image.layers.push(Layer {
             name: STATE.to_string(),
-            channels: film.planes().0.into_iter().map(channel).collect(),
+            channels: planes.0.into_iter().map(channel).collect(),
         });
         image
     }
 }
 
 impl Saved {
+    /// Whether there is a checkpoint or a shard, as far as its head tells.
+    pub fn is_one(path: &Path) -> bool {
+        let image = path.exists().then(|| Image::read(path).ok()).flatten();
+        let told = image.and_then(|image| image.metadata);
+        let told = told.and_then(|text| serde_json::from_str::<Value>(&text).ok());
+        told.is_some_and(|told| told.get(STATE).is_some())
+    }
+
     /// # Errors
     /// In words, without the name of the file: it cannot be read, is no part of a picture or of another version, or is
     /// not complete.
@@ -203,7 +234,11 @@ impl Saved {
         };
         film = film.with_parts(head.parts);
         let [first, end] = head.samples.unwrap_or_default();
-        film.add_planes(&planes(image), &Taken::Range(first..end))
+        let planes = planes(image);
+        if checksum(&planes) != head.checksum {
+            return Err("it is damaged: what was summed is not what was written".to_string());
+        }
+        film.add_planes(&planes, &Taken::Range(first..end))
             .map_err(|e| e.to_string())?;
         if head.samples.is_some() {
             let goal = [head.goal; 2];
@@ -230,6 +265,20 @@ impl Saved {
             .map(|(shard, spp)| shard.range(spp));
         whole.is_some() && self.film.range() == whole
     }
+}
+
+/// Of names and numbers, in whatever order the planes are (the sum of their FNV-1a hashes of 64 bits, by words; Fowler,
+/// Noll & Vo 1991): any bit that flips changes it.
+fn checksum(planes: &Planes) -> String {
+    const BASIS: u64 = 0xcbf2_9ce4_8422_2325;
+    const PRIME: u64 = 0x100_0000_01b3;
+    let step = |hash: u64, word: u32| (hash ^ u64::from(word)).wrapping_mul(PRIME);
+    let of = |(name, plane): &(String, Vec<u32>)| {
+        let name = name.bytes().map(u32::from);
+        name.chain(plane.iter().copied()).fold(BASIS, step)
+    };
+    let sum = planes.0.iter().map(of).fold(0, u64::wrapping_add);
+    format!("{sum:016x}")
 }
 
 fn planes(image: Image) -> Planes {
