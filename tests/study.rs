@@ -349,9 +349,50 @@ fn what_is_wrong_is_said() {
         said.contains("8 x 6 pixels, but the study renders 16 x 12"),
         "{said}"
     );
+    // None of these has made the folder its own.
+    assert!(!folder.0.join("b").exists());
     folder.refused("ball.xml -o b --spp 8..1", 2);
     folder.refused("ball.xml -o b --runs 2", 2);
     folder.refused("ball.xml", 2);
+    let said = folder.refused("ball.xml -o b --want 1e300%", 2);
+    assert!(said.contains("from 0.0000001% to 1000000%"), "{said}");
+}
+
+#[test]
+fn methods_that_do_not_show_the_same_thing_are_named() {
+    let folder = Folder::new("differ");
+    let scene = BALL.replace(
+        "\"max_depth\" value=\"3\"",
+        "\"max_depth\" value=\"$depth\"",
+    );
+    let named = "<default name=\"depth\" value=\"3\"/><default name=\"albedo\"";
+    folder.write(
+        "my ball.xml",
+        &scene.replace("<default name=\"albedo\"", named),
+    );
+    let output = Command::new(env!("CARGO_BIN_EXE_luxel"))
+        .current_dir(&folder.0)
+        .args(["study", "my ball.xml", "-o", "out", "--vary", "depth=2,3"])
+        .args(["--spp", "16,64", "--runs", "4", "--reference-time", "1s"])
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert!(said.contains("do not show the same thing"), "{said}");
+    let json = folder.json("out/results.json");
+    let found = json["findings"][0].as_str().unwrap();
+    assert!(
+        said.contains(found) && found.contains("path depth="),
+        "{found}"
+    );
+    // The command can be given to a shell as it is.
+    let command = json["command"].as_str().unwrap();
+    assert!(command.contains("study 'my ball.xml' -o out"), "{command}");
+    // Samplers show the same thing.
+    let line = "ball.xml -o same --vary sampler=independent,sobol --spp 16,64 --runs 4 --reference-time 1s";
+    folder.write("ball.xml", BALL);
+    let said = folder.done(line);
+    assert!(!said.contains("do not show the same thing"), "{said}");
 }
 
 #[test]

@@ -147,7 +147,7 @@ pub fn run(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     };
     let line = args
         .iter()
-        .map(|a| a.to_string_lossy())
+        .map(|a| study::quoted(&a.to_string_lossy()))
         .collect::<Vec<_>>()
         .join(" ");
     let result = match &cli.command {

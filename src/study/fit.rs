@@ -1,6 +1,8 @@
 //! How error goes with samples: slopes in log-log plots with their intervals, where bias takes over, and
 //! how many samples and seconds a wanted error takes.
 
+use std::fmt;
+
 use super::statistics::Estimate;
 
 /// One setting of a method, as the fits see it. Errors are relative: roots of relMSE and of its parts.
@@ -124,8 +126,8 @@ pub fn line(points: impl Iterator<Item = (f64, Estimate, usize)>) -> Option<Line
 pub enum Bias {
     /// Within its interval of zero at the largest setting; this much is the end of the interval.
     NotSeen { below: f64 },
-    /// Seen, and falling with the number of samples N like N^slope.
-    Falls { last: Estimate, slope: Estimate },
+    /// Seen, and falling with the number of samples along the line.
+    Falls { last: Estimate, line: Line },
     /// Seen at the largest setting and not falling. From `floor_spp` samples on, where known, it makes up more
     /// of the error than noise does.
     Stays {
@@ -145,9 +147,44 @@ pub enum Forecast {
     },
     /// The bias that stays, this much, is more.
     NeverBelow(f64),
-    /// Too little is known of how error falls.
-    Unknown,
+    /// Too little is known.
+    Unknown(Doubt),
 }
+
+/// Why there is no forecast.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Doubt {
+    /// Error is not known to fall, or the settings are too few to say.
+    Slope,
+    /// Error falls, but the interval of its slope is so wide that what it says beyond the settings is worth nothing.
+    WideSlope,
+    /// Nothing excludes a bias that is larger than the error wanted: it may be this much.
+    BiasUpTo(f64),
+    /// Bias was seen to fall, but perhaps so slowly that no number of samples helps.
+    SlowBias,
+}
+
+impl fmt::Display for Doubt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Doubt::Slope => f.write_str("error is not known to fall"),
+            Doubt::WideSlope => {
+                f.write_str("the slope is too uncertain: more settings or runs are needed")
+            }
+            Doubt::BiasUpTo(most) => {
+                write!(f, "bias may be as large as {:.2} %", 100.0 * most)
+            }
+            Doubt::SlowBias => f.write_str("bias may fall too slowly"),
+        }
+    }
+}
+
+/// Slopes whose intervals are wider than this do not tell N^-1/2 from N^-1, and say nothing beyond the settings.
+const WIDEST_SLOPE: f64 = 0.5;
+
+/// Bias that may fall more slowly than N to this power takes a thousandfold of samples for half of it, and more:
+/// no forecast over so many would hold.
+const SLOWEST_BIAS: f64 = -0.1;
 
 /// All that is known of how a method converges.
 #[derive(Clone, Debug, PartialEq)]
@@ -163,12 +200,19 @@ pub struct Convergence {
     pub exact: bool,
     /// The fewest samples without any error, with their seconds.
     pub exact_from: Option<[f64; 2]>,
+    /// Whether the method has a bias by its nature. Of others, bias that is not seen counts as none.
+    biased: bool,
+    /// Samples of the largest setting.
+    most_spp: f64,
+    /// Of each setting, its samples and the upper end of its bias.
+    bias_bounds: Vec<[f64; 2]>,
 }
 
 impl Convergence {
-    /// From the settings of one method, by increasing samples.
-    pub fn of(points: &[FitPoint]) -> Convergence {
+    /// From the settings of one method, by increasing samples; `biased` tells whether it has a bias by its nature.
+    pub fn of(points: &[FitPoint], biased: bool) -> Convergence {
         let noise = line(points.iter().map(|p| (p.spp, p.variance, p.runs)));
+        let bound = |p: &FitPoint| [p.spp, p.bias2.root().high];
         Convergence {
             error: line(points.iter().map(|p| (p.spp, p.mse, p.runs))),
             bias: bias(points, noise.as_ref()),
@@ -176,6 +220,9 @@ impl Convergence {
             seconds: seconds(points),
             exact: !points.is_empty() && points.iter().all(is_exact),
             exact_from: exact_from(points),
+            biased,
+            most_spp: points.last().map_or(0.0, |p| p.spp),
+            bias_bounds: points.iter().map(bound).collect(),
         }
     }
 
@@ -199,26 +246,19 @@ impl Convergence {
     }
 
     fn by_line(&self, wanted: f64) -> Forecast {
-        if wanted.is_nan() || wanted <= 0.0 {
-            return Forecast::Unknown;
-        }
-        let (line, target) = match self.bias {
-            Some(Bias::Stays { last, .. }) => {
-                if last.value >= wanted {
-                    return Forecast::NeverBelow(last.value);
-                }
-                // The noise may fill what the bias leaves.
-                let left = (wanted * wanted - last.value * last.value).sqrt();
-                (self.noise, left)
-            }
-            Some(Bias::Falls { .. }) => (self.error, wanted),
-            _ => (self.noise.or(self.error), wanted),
+        let Some([before, each]) = self.seconds else {
+            return Forecast::Unknown(Doubt::Slope);
         };
-        let (Some(line), Some([before, each])) = (line, self.seconds) else {
-            return Forecast::Unknown;
+        let spp = match self.bias {
+            _ if wanted.is_nan() || wanted <= 0.0 => Err(Forecast::Unknown(Doubt::Slope)),
+            Some(Bias::Stays { last, .. }) => self.beside_bias(wanted, last),
+            Some(Bias::Falls { line, .. }) => self.with_falling_bias(wanted, &line),
+            Some(Bias::NotSeen { below }) if self.biased => self.beside_unseen_bias(wanted, below),
+            _ => self.reach(self.noise.or(self.error).as_ref(), wanted),
         };
-        let Some(spp) = line.where_it_falls_to(target) else {
-            return Forecast::Unknown;
+        let spp = match spp {
+            Ok(spp) => spp,
+            Err(none) => return none,
         };
         // No time per sample is none for any number of them, however many.
         let time = |n: f64| before + if each > 0.0 { each * n.max(1.0) } else { 0.0 };
@@ -229,6 +269,87 @@ impl Convergence {
             high: time(spp.high),
         };
         Forecast::Reached { spp, seconds }
+    }
+
+    /// The samples at which a line falls to `y`; no forecast beyond the settings from a slope that is hardly known.
+    fn reach(&self, line: Option<&Line>, y: f64) -> Result<Estimate, Forecast> {
+        let slope = line.ok_or(Forecast::Unknown(Doubt::Slope))?.slope;
+        let wide = slope.high - slope.low > WIDEST_SLOPE;
+        match line.and_then(|l| l.where_it_falls_to(y)) {
+            Some(spp) if wide && spp.value > self.most_spp => {
+                Err(Forecast::Unknown(Doubt::WideSlope))
+            }
+            Some(spp) => Ok(spp),
+            None if wide => Err(Forecast::Unknown(Doubt::WideSlope)),
+            None => Err(Forecast::Unknown(Doubt::Slope)),
+        }
+    }
+
+    /// The samples whose noise fills what a bias leaves of the wanted error.
+    fn beside_bias(&self, wanted: f64, bias: Estimate) -> Result<Estimate, Forecast> {
+        if bias.low >= wanted {
+            return Err(Forecast::NeverBelow(bias.value));
+        }
+        if bias.high.is_nan() || bias.high >= wanted {
+            return Err(Forecast::Unknown(Doubt::BiasUpTo(bias.high)));
+        }
+        let left = |bias: f64| (wanted * wanted - bias * bias).sqrt();
+        let of = |bias: f64| self.reach(self.noise.as_ref(), left(bias));
+        let spp = of(bias.value)?;
+        Ok(Estimate {
+            high: of(bias.high)?.high.max(spp.high),
+            ..spp
+        })
+    }
+
+    /// As [`Convergence::beside_bias`] with a bias of zero to `below`, and from the setting on from which it is known to be
+    /// below the wanted error: fewer samples may have more of it.
+    fn beside_unseen_bias(&self, wanted: f64, below: f64) -> Result<Estimate, Forecast> {
+        let unseen = Estimate {
+            value: 0.0,
+            sd: 0.0,
+            low: 0.0,
+            high: below,
+        };
+        let spp = self.beside_bias(wanted, unseen)?;
+        let known = self.bias_bounds.iter().rev();
+        let first = known.take_while(|[_, bound]| *bound < wanted).last();
+        let first = first.map_or(self.most_spp, |[spp, _]| *spp);
+        Ok(Estimate {
+            value: spp.value.max(first),
+            high: spp.high.max(first),
+            ..spp
+        })
+    }
+
+    /// The samples at which the squares of noise and bias, each by its own line, add up to that of the wanted error.
+    fn with_falling_bias(&self, wanted: f64, bias: &Line) -> Result<Estimate, Forecast> {
+        if bias.slope.high > SLOWEST_BIAS {
+            return Err(Forecast::Unknown(Doubt::SlowBias));
+        }
+        let noise = self.noise.ok_or(Forecast::Unknown(Doubt::Slope))?;
+        let later = |y: f64| -> Result<[Estimate; 2], Forecast> {
+            Ok([self.reach(Some(&noise), y)?, self.reach(Some(bias), y)?])
+        };
+        // Either alone must have fallen to the wanted error; and where both are at 1/√2 of it, their sum is.
+        let ([a, b], [c, d]) = (later(wanted)?, later(wanted / 2f64.sqrt())?);
+        let (mut low, mut high) = (a.value.max(b.value).ln(), c.value.max(d.value).ln());
+        // Halved until the number of samples is known to rounding.
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            let x = middle.exp();
+            match noise.at(x).hypot(bias.at(x)) > wanted {
+                true => low = middle,
+                false => high = middle,
+            }
+        }
+        let value = (0.5 * (low + high)).exp();
+        Ok(Estimate {
+            value,
+            sd: c.sd.max(d.sd),
+            low: a.low.max(b.low).min(value),
+            high: c.high.max(d.high).max(value),
+        })
     }
 }
 
@@ -254,7 +375,7 @@ fn bias(points: &[FitPoint], noise: Option<&Line>) -> Option<Bias> {
     if let Some(falling) = falling.filter(|l| l.slope.high < 0.0) {
         return Some(Bias::Falls {
             last: root,
-            slope: falling.slope,
+            line: falling,
         });
     }
     let floor_spp = match (noise, last.variance.value > 0.0) {
@@ -303,183 +424,4 @@ fn seconds(points: &[FitPoint]) -> Option<[f64; 2]> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn points(f: impl Fn(f64) -> (f64, f64)) -> Vec<FitPoint> {
-        let point = |k: i32| {
-            let spp = f64::from(1 << k);
-            let (bias2, variance) = f(spp);
-            FitPoint {
-                spp,
-                seconds: 0.5 + 0.01 * spp,
-                runs: 8,
-                mse: Estimate::new(bias2 + variance, 0.02 * (bias2 + variance), 2.36),
-                bias2: Estimate::new(bias2, 0.05 * bias2 + 0.01 * variance, 2.36),
-                variance: Estimate::new(variance, 0.02 * variance, 2.36),
-            }
-        };
-        (0..=8).map(point).collect()
-    }
-
-    #[test]
-    fn noise_alone_falls_by_the_root_and_is_forecast() {
-        let c = Convergence::of(&points(|n| (0.0, 0.04 / n)));
-        let slope = c.error.unwrap().slope;
-        assert!((slope.value + 0.5).abs() < 1e-9 && slope.low < -0.5 && slope.high > -0.5);
-        assert!(matches!(c.bias, Some(Bias::NotSeen { .. })), "{:?}", c.bias);
-        let Forecast::Reached { spp, seconds } = c.forecast(0.01) else {
-            panic!("{:?}", c.forecast(0.01));
-        };
-        assert!((spp.value - 400.0).abs() < 1e-6 && spp.low < 400.0 && spp.high > 400.0);
-        assert!((seconds.value - 4.5).abs() < 1e-6, "{seconds:?}");
-    }
-
-    #[test]
-    fn a_bias_that_stays_is_a_floor() {
-        // Noise 0.2 / sqrt(N) meets the bias of 0.02 at N = 100.
-        let c = Convergence::of(&points(|n| (4e-4, 0.04 / n)));
-        let Some(Bias::Stays { last, floor_spp }) = c.bias else {
-            panic!("{:?}", c.bias);
-        };
-        assert!((last.value - 0.02).abs() < 1e-9);
-        assert!((floor_spp.unwrap() - 100.0).abs() < 1e-6);
-        assert_eq!(c.forecast(0.01), Forecast::NeverBelow(last.value));
-        // 0.025² = 0.02² + 0.015²: the noise of 178 samples.
-        let Forecast::Reached { spp, .. } = c.forecast(0.025) else {
-            panic!();
-        };
-        assert!((spp.value - 0.04 / 2.25e-4).abs() < 1e-6);
-    }
-
-    #[test]
-    fn a_bias_that_falls_is_no_floor() {
-        // As of density estimation with shrinking radii: bias² ~ N^-2/3.
-        let c = Convergence::of(&points(|n| (1e-2 * n.powf(-2.0 / 3.0), 1e-3 / n)));
-        let Some(Bias::Falls { slope, .. }) = c.bias else {
-            panic!("{:?}", c.bias);
-        };
-        assert!(
-            slope.low < -1.0 / 3.0 && slope.high > -1.0 / 3.0,
-            "{slope:?}"
-        );
-        assert!(matches!(c.forecast(1e-3), Forecast::Reached { .. }));
-    }
-
-    #[test]
-    fn no_error_has_no_slope() {
-        let mut all = points(|_| (0.0, 0.0));
-        for p in &mut all {
-            p.mse = Estimate::exact(0.0);
-        }
-        let c = Convergence::of(&all);
-        assert!(c.exact && c.error.is_none() && c.noise.is_none());
-        assert_eq!(c.forecast(0.01), Forecast::Exact);
-        let nothing = Convergence::of(&[]);
-        assert_eq!(nothing.forecast(0.01), Forecast::Unknown);
-    }
-
-    #[test]
-    fn other_powers_are_found_and_noise_is_in_their_interval() {
-        // N^-3/4, as of well-spread points, with errors of some per cent on the squares.
-        let mut all = points(|n| (0.0, 0.04 * n.powf(-1.5)));
-        for (k, p) in all.iter_mut().enumerate() {
-            let by = 1.0 + 0.03 * if k % 2 == 0 { 1.0 } else { -1.0 };
-            (p.mse.value, p.variance.value) = (p.mse.value * by, p.variance.value * by);
-        }
-        let c = Convergence::of(&all);
-        let slope = c.error.unwrap().slope;
-        assert!(slope.low < -0.75 && slope.high > -0.75, "{slope:?}");
-        assert!(slope.high - slope.low < 0.05, "{slope:?}");
-        // 0.2 N^-3/4 is 0.002 at N = 100^(2/1.5).
-        let Forecast::Reached { spp, .. } = c.forecast(0.002) else {
-            panic!("{:?}", c.forecast(0.002));
-        };
-        let truth = 1e4f64.powf(1.0 / 1.5);
-        assert!(spp.low < truth && truth < spp.high, "{spp:?} {truth}");
-    }
-
-    #[test]
-    fn two_settings_have_a_line_with_an_interval() {
-        let c = Convergence::of(&points(|n| (0.0, 0.04 / n))[3..5]);
-        let slope = c.error.unwrap().slope;
-        assert!((slope.value + 0.5).abs() < 1e-9);
-        assert!(slope.low < -0.5 && slope.high > -0.5 && slope.high - slope.low < 0.5);
-        assert!(matches!(c.forecast(0.01), Forecast::Reached { .. }));
-    }
-
-    #[test]
-    fn settings_of_the_same_samples_have_no_slope() {
-        // Times so short that all come to one sample per pixel.
-        let mut all = points(|n| (0.0, 0.04 / n));
-        all.iter_mut().for_each(|p| p.spp = 1.0);
-        let c = Convergence::of(&all);
-        assert!(c.error.is_none() && c.noise.is_none());
-        assert_eq!(c.forecast(0.01), Forecast::Unknown);
-        // And where only the first and the last are alike, all are used.
-        all[4].spp = 4.0;
-        assert!(Convergence::of(&all).error.is_some());
-    }
-
-    #[test]
-    fn what_was_measured_without_error_is_reached() {
-        // An error of 0.2 / √N that is gone from 64 samples on.
-        let mut all = points(|n| (0.0, if n < 64.0 { 0.04 / n } else { 0.0 }));
-        for p in &mut all[6..] {
-            (p.mse, p.bias2, p.variance) = (
-                Estimate::exact(0.0),
-                Estimate::exact(0.0),
-                Estimate::exact(0.0),
-            );
-        }
-        let c = Convergence::of(&all);
-        assert!(!c.exact && (c.error.unwrap().slope.value + 0.5).abs() < 1e-9);
-        let spp = |wanted: f64| match c.forecast(wanted) {
-            Forecast::Reached { spp, seconds } => {
-                assert!(seconds.value.is_finite());
-                spp.value
-            }
-            other => panic!("{other:?}"),
-        };
-        assert!((spp(0.04) - 25.0).abs() < 1e-6);
-        assert_eq!((spp(0.01), spp(1e-9)), (64.0, 64.0));
-    }
-
-    #[test]
-    fn no_number_is_ever_nonsense() {
-        // Negative, infinite and unknown values in every place.
-        let odd = [0.0, -1e-3, f64::NAN, f64::INFINITY, 1e-300, 1e300, 0.04];
-        for a in odd {
-            for b in odd {
-                let mut all = points(|n| (0.0, 0.04 / n));
-                all[2].mse = Estimate::new(a, b.abs(), 2.0);
-                all[5].variance = Estimate::new(b, a, 2.0);
-                all[8].bias2 = Estimate::new(a, b, 2.0);
-                all[7].seconds = if b.is_finite() { b } else { 1.0 };
-                let c = Convergence::of(&all);
-                let lines = [c.error, c.noise].into_iter().flatten();
-                for line in lines {
-                    assert!(
-                        !line.slope.value.is_nan() && !line.at_center.value.is_nan(),
-                        "{a} {b}: {line:?}"
-                    );
-                }
-                for wanted in [0.0, -1.0, f64::NAN, 1e-300, 0.01, 1e300] {
-                    if let Forecast::Reached { spp, seconds } = c.forecast(wanted) {
-                        assert!(
-                            !spp.value.is_nan() && !seconds.value.is_nan(),
-                            "{a} {b} {wanted}"
-                        );
-                    }
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn one_setting_gives_no_slope_but_no_nonsense_either() {
-        let c = Convergence::of(&points(|n| (0.0, 0.04 / n))[..1]);
-        assert!(c.error.is_none());
-        assert_eq!(c.forecast(0.01), Forecast::Unknown);
-    }
-}
+mod tests;

@@ -2,7 +2,8 @@
 //! and a picture of the error. These work on two pictures and know nothing of how they were made.
 //!
 //! Above them, studies: [`plan`] says what is rendered how often, [`sweep`] does it, [`statistics`] tells bias
-//! from noise over the runs, [`fit`] draws lines through the errors, [`results`] and [`report`] write.
+//! from noise over the runs, [`fit`] draws lines through the errors, [`remarks`] warns of what
+//! cannot be believed, [`results`] and [`report`] write.
 
 pub mod error_map;
 pub mod evaluate;
@@ -13,6 +14,7 @@ pub mod memory;
 pub mod metrics;
 pub mod plan;
 pub mod reference;
+pub mod remarks;
 pub mod report;
 pub mod results;
 pub mod runs;

@@ -51,6 +51,7 @@ pub fn to_json(study: &Study, findings: &Findings) -> Value {
             "ten_times_below": findings.times_below.map(|t| t >= TIMES_BELOW),
             "flip_floor": findings.flip_floor,
         },
+        "findings": findings.remarks,
         "methods": methods,
         "points": points,
     })
@@ -65,7 +66,7 @@ fn method_json(study: &Study, findings: &Findings, m: usize) -> Value {
     let method = &study.methods[m];
     let of_method = findings.rows.iter().filter(|r| r.method == m);
     let points: Vec<FitPoint> = of_method.map(Row::fit_point).collect();
-    let c = Convergence::of(&points);
+    let c = Convergence::of(&points, method.job.integrator.biased());
     let line = |l: &super::fit::Line| {
         json!({
             "slope": l.slope.value,
@@ -98,8 +99,8 @@ fn method_json(study: &Study, findings: &Findings, m: usize) -> Value {
 fn bias_json(bias: Bias) -> Value {
     match bias {
         Bias::NotSeen { below } => json!({ "kind": "not seen", "below": below }),
-        Bias::Falls { last, slope } => {
-            json!({ "kind": "falls", "last": estimate(last), "slope": estimate(slope) })
+        Bias::Falls { last, line } => {
+            json!({ "kind": "falls", "last": estimate(last), "slope": estimate(line.slope) })
         }
         Bias::Stays { last, floor_spp } => {
             json!({ "kind": "stays", "last": estimate(last), "floor_spp": floor_spp })
@@ -110,7 +111,7 @@ fn bias_json(bias: Bias) -> Value {
 fn forecast_json(wanted: f64, forecast: Forecast) -> Value {
     let (kind, more) = match forecast {
         Forecast::Exact => ("exact", json!({})),
-        Forecast::Unknown => ("unknown", json!({})),
+        Forecast::Unknown(why) => ("unknown", json!({ "why": why.to_string() })),
         Forecast::NeverBelow(bias) => ("never", json!({ "bias": bias })),
         Forecast::Reached { spp, seconds } => (
             "reached",
@@ -272,9 +273,18 @@ pub fn summary(json: &Value) -> Vec<String> {
     methods.map(method_line).collect()
 }
 
+/// With so many decimals; in powers of ten where that would make a long row of digits, or leave nothing.
+fn short(v: f64, decimals: usize) -> String {
+    let least = 0.5 * 10f64.powi(-(decimals as i32));
+    match v == 0.0 || (least..1e12).contains(&v.abs()) || !v.is_finite() {
+        true => format!("{v:.decimals$}"),
+        false => format!("{v:.2e}"),
+    }
+}
+
 fn method_line(method: &Value) -> String {
     let number = |v: &Value| v.as_f64().unwrap_or(f64::NAN);
-    let percent = |v: &Value| format!("{:.2} %", 100.0 * number(v));
+    let percent = |v: &Value| format!("{} %", short(100.0 * number(v), 2));
     let slope = match &method["error_slope"] {
         Value::Null if method["exact"] == true => "slope none".to_string(),
         Value::Null => "no slope from one setting".to_string(),
@@ -296,24 +306,28 @@ fn method_line(method: &Value) -> String {
         ),
         Some(_) => match bias["floor_spp"].as_f64() {
             Some(spp) => format!(
-                "bias {}, more than noise from {spp:.0} spp",
-                percent(&bias["last"]["value"])
+                "bias {}, more than noise from {} spp",
+                percent(&bias["last"]["value"]),
+                short(spp, 0)
             ),
             None => format!("bias {}", percent(&bias["last"]["value"])),
         },
         None => "bias unknown".to_string(),
     };
     let forecast = |f: &Value| {
-        let wanted = format!("{:.3} %", 100.0 * number(&f["wanted"]));
+        let wanted = format!("{} %", short(100.0 * number(&f["wanted"]), 3));
         match f["kind"].as_str() {
             Some("reached") => format!(
-                "{wanted} takes {:.0} spp, {:.2} s",
-                number(&f["spp"]["value"]).max(1.0),
-                number(&f["seconds"]["value"])
+                "{wanted} takes {} spp, {} s",
+                short(number(&f["spp"]["value"]).max(1.0), 0),
+                short(number(&f["seconds"]["value"]), 2)
             ),
             Some("never") => format!("{wanted} is below its bias"),
             Some("exact") => format!("{wanted} is reached at once"),
-            _ => format!("{wanted}: no forecast"),
+            _ => match f["why"].as_str() {
+                Some(why) => format!("{wanted}: no forecast ({why})"),
+                None => format!("{wanted}: no forecast"),
+            },
         }
     };
     let forecasts = method["forecasts"].as_array().into_iter().flatten();
@@ -329,6 +343,25 @@ fn method_line(method: &Value) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_are_short_whatever_their_size() {
+        assert_eq!(
+            (short(1.0, 3), short(0.0, 2)),
+            ("1.000".into(), "0.00".into())
+        );
+        assert_eq!(
+            (short(1e300, 3), short(1e-7, 3)),
+            ("1.00e300".into(), "1.00e-7".into())
+        );
+        let forecast =
+            json!({ "wanted": 1e298, "kind": "unknown", "why": "bias may be as large as 3.00 %" });
+        let line = method_line(&json!({ "label": "sppm", "forecasts": [forecast] }));
+        assert!(
+            line.ends_with("1.00e300 %: no forecast (bias may be as large as 3.00 %)"),
+            "{line}"
+        );
+    }
 
     #[test]
     fn cells_with_commas_are_quoted_and_missing_ones_empty() {

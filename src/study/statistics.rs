@@ -60,13 +60,13 @@ impl Estimate {
 
     /// The mean of independent numbers that are not below zero, such as squared errors. A few of their pixels often
     /// make up most of them, and a low mean comes with a low spread then, so that Student's t alone holds too seldom
-    /// (of 8 exponential numbers 90 %, of gamma-distributed ones of shape 1/2 84 %). The upper end is that of the
-    /// logarithm (95 % and 92 %), which is the same where the spread is small.
+    /// (of 8 exponential numbers 90 %, of gamma-distributed ones of shape 1/2 84 %). The ends are those of the
+    /// logarithm (95 % and 92 %), which are the same where the spread is small.
     pub fn mean_of_squares(values: &[f64]) -> Estimate {
         Estimate::mean_of(values).skewed()
     }
 
-    /// With the upper end that the interval of the logarithm would have.
+    /// With the ends that the interval of the logarithm would have.
     fn skewed(self) -> Estimate {
         if self.value <= 0.0 {
             return self;
@@ -75,13 +75,34 @@ impl Estimate {
         let ratio = ((self.high - self.value) / self.value).min(20.0);
         Estimate {
             high: self.value * ratio.exp(),
+            ..self.above_zero()
+        }
+    }
+
+    /// Of what is above zero by its nature: with the lower end that the interval of the logarithm would have.
+    pub fn above_zero(self) -> Estimate {
+        let low = match self.value > 0.0 {
+            true => self.value * ((self.low - self.value) / self.value).exp(),
+            false => self.low.max(0.0),
+        };
+        Estimate { low, ..self }
+    }
+
+    /// Of what is not below zero by its nature, though differences that estimate it may come out so.
+    fn not_below_zero(self) -> Estimate {
+        Estimate {
+            value: self.value.max(0.0),
+            low: self.low.max(0.0),
+            high: self.high.max(0.0),
             ..self
         }
     }
 
-    /// The square root, of what is below zero: zero.
+    /// The square root, of what is below zero: zero. An estimate that may be zero is not said to be below what its
+    /// standard deviation allows, even if it came out far below zero: that is chance, and no proof of a small root.
     pub fn root(self) -> Estimate {
         let value = self.value.max(0.0).sqrt();
+        let by_chance = if self.low <= 0.0 { 1.96 * self.sd } else { 0.0 };
         Estimate {
             value,
             // Half the relative deviation, as for any square root; where the value is within its noise of
@@ -92,7 +113,7 @@ impl Estimate {
                 0.0
             },
             low: self.low.max(0.0).sqrt(),
-            high: self.high.max(0.0).sqrt(),
+            high: self.high.max(by_chance).max(0.0).sqrt(),
         }
     }
 }
@@ -352,7 +373,7 @@ impl Moments {
         let variance_sd = (jack * jack_variance).sqrt();
         let variance = Estimate::new(squares.value - between, variance_sd, t);
         Moments {
-            mse: with_reference(squares),
+            mse: with_reference(squares).not_below_zero(),
             bias2: with_reference(Estimate::new(between, of_bias.sqrt(), t)),
             variance: variance.skewed(),
         }

@@ -5,6 +5,7 @@ use std::time::Duration;
 use super::evaluate::{self, Row};
 use super::plan::{Method, Plan, ReferenceChoice, Study, StudyError};
 use super::reference::{Known, Maker, TIMES_BELOW};
+use super::remarks::remarks;
 use super::runs::{self, Record};
 use super::statistics::{Gram, Reference, Weighing, mean_picture};
 use super::{Picture, flip_floor, report, results};
@@ -21,6 +22,8 @@ pub struct Findings {
     pub flip_floor: Option<f64>,
     /// Method by method, and for each by increasing amounts.
     pub rows: Vec<Row>,
+    /// What must be known before the figures are believed, in sentences.
+    pub remarks: Vec<String>,
 }
 
 /// Renders what is not there yet, makes the reference, and writes results, pictures and report. `Ok(None)` when
@@ -34,11 +37,11 @@ pub fn run(
     stopped: &dyn Fn() -> bool,
     say: &mut dyn FnMut(&str),
 ) -> Result<Option<Findings>, StudyError> {
-    runs::claim_folder(&study.plan)?;
-    // Wrong references are better found before long renderings.
+    // Wrong references are better found before long renderings, and before the folder is this study's.
     if let ReferenceChoice::File(path) = &study.reference {
         Known::read(path, study.methods[0].job.film.crop)?;
     }
+    runs::claim_folder(&study.plan)?;
     let Some(records) = all_runs(study, stopped, say)? else {
         return Ok(None);
     };
@@ -57,6 +60,7 @@ pub fn run(
     }
     evaluate::mark_front(&mut rows);
     let findings = Findings {
+        remarks: remarks(study, &rows, &reference, times_below)?,
         flip_floor: flip_floor::floor(&reference.reference),
         reference,
         times_below,

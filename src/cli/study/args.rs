@@ -1,5 +1,6 @@
 //! The arguments of `luxel study`.
 
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -33,7 +34,7 @@ pub struct StudyArgs {
     /// Times in place of samples: 1s,10s,1m
     #[arg(long, value_name = "TIME,...", value_delimiter = ',', value_parser = parse_duration)]
     pub times: Vec<Duration>,
-    /// Independent runs of each; their spread tells noise from bias
+    /// Independent runs of each, 3 to 1000; their spread tells noise from bias
     #[arg(long, value_name = "N", default_value_t = 8, allow_negative_numbers = true, value_parser = whole(3..=1000usize))]
     pub runs: usize,
     /// Compare with this picture [default: one is made]
@@ -114,6 +115,9 @@ fn parse_vary(text: &str) -> Result<(String, Vec<String>), String> {
     }
 }
 
+/// Errors that pictures in 32 bits can have, and a little less; beyond these, it is a slip of the hand.
+const SENSIBLE: RangeInclusive<f64> = 1e-9..=1e4;
+
 /// `1%` or `0.01`.
 fn parse_share(text: &str) -> Result<f64, String> {
     let (number, factor) = match text.trim().strip_suffix('%') {
@@ -121,7 +125,11 @@ fn parse_share(text: &str) -> Result<f64, String> {
         None => (text, 1.0),
     };
     let value = positive(number.trim()).map(|v| v * factor);
-    value.map_err(|_| "expected an error above zero such as 1%".to_string())
+    let value = value.map_err(|_| "expected an error above zero such as 1%".to_string())?;
+    match SENSIBLE.contains(&value) {
+        true => Ok(value),
+        false => Err("expected an error from 0.0000001% to 1000000%".to_string()),
+    }
 }
 
 #[cfg(test)]
@@ -153,7 +161,7 @@ mod tests {
             (parse_share("1%"), parse_share("0.02")),
             (Ok(0.01), Ok(0.02))
         );
-        for bad in ["", "%", "-1%", "0", "nan%"] {
+        for bad in ["", "%", "-1%", "0", "nan%", "1e300%", "1e-20"] {
             assert!(parse_share(bad).is_err(), "{bad}");
         }
     }

@@ -174,8 +174,8 @@ fn arguments(args: &StudyArgs, variant: &Variant) -> String {
     parts.join(" ")
 }
 
-/// For a shell of Unix.
-fn quoted(text: &str) -> String {
+/// An argument as a shell of Unix reads it.
+pub fn quoted(text: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "/._-=,:+@%".contains(c);
     match !text.is_empty() && text.chars().all(plain) {
         true => text.to_string(),
@@ -348,6 +348,9 @@ fn warn_of_reference(findings: &Findings) {
 /// A line per method, and where to look.
 fn conclude(study: &Study, findings: &Findings) {
     warn_of_reference(findings);
+    for remark in &findings.remarks {
+        eprintln!("warning: {remark}");
+    }
     let invalid: u64 = findings
         .rows
         .iter()

@@ -19,7 +19,7 @@ function floorText(m) {
 function forecastText(f) {
   if (f.kind === "exact") return ["at once"];
   if (f.kind === "never") return ["never: bias " + percent(f.bias)];
-  if (f.kind === "unknown") return ["–"];
+  if (f.kind === "unknown") return f.why ? ["none", make("br"), make("span", { class: "range" }, f.why)] : ["–"];
   const times = (e) => `${short(Math.max(1, e.ci95[0]))} to ${short(e.ci95[1])}`;
   return [`${short(Math.max(1, f.spp.value))} spp, ${short(f.seconds.value)} s`, make("br"), make("span", { class: "range" }, times(f.spp) + " spp")];
 }
@@ -44,6 +44,7 @@ function startTables() {
     : "The reference's error is not below the smallest one studied, which is hardly seen beside it: those figures say little.");
   if (POINTS.some((p) => p.flip_resolved === false)) warn.push(`The reference's noise alone makes a FLIP of ${short(ref.flip_floor)}, which cannot be taken off: FLIPs below three times that are marked ≲ and are not resolved.`);
   if (ref.error === null) warn.push("The reference counts as exact, since it does not tell its own error: what it has of that is in all figures.");
+  warn.push(...(R.findings ?? []).map((t) => t[0].toUpperCase() + t.slice(1) + "."));
   byId("warnings").append(...warn.map((t) => make("p", { class: "warning" }, t)));
 
   const wanted = METHODS.length ? METHODS[0].forecasts.map((f) => f.wanted) : [];

@@ -249,13 +249,44 @@ fn few_runs_say_little_but_no_nonsense() {
             bias2: m.bias2,
             variance: m.variance,
         };
-        let c = crate::study::fit::Convergence::of(&[
-            point,
-            crate::study::fit::FitPoint { spp: 8.0, ..point },
-        ]);
+        let c = crate::study::fit::Convergence::of(
+            &[point, crate::study::fit::FitPoint { spp: 8.0, ..point }],
+            false,
+        );
         if let Some(line) = c.error {
             assert!(line.slope.value.is_finite(), "{line:?}");
         }
         assert!(!format!("{:?}", c.forecast(0.01)).contains("NaN"));
     }
+}
+
+#[test]
+fn ends_of_errors_are_not_below_zero() {
+    // Three numbers of a wide spread: Student's t alone would end below zero.
+    let squares = Estimate::mean_of_squares(&[0.1, 1.0, 4.0]);
+    assert!(
+        squares.low > 0.0 && squares.low < 1.0 && squares.high > 4.0,
+        "{squares:?}"
+    );
+    let seconds = Estimate::mean_of(&[0.001, 0.2, 0.003]);
+    assert!(seconds.low < 0.0 && seconds.above_zero().low > 0.0);
+    assert_eq!(seconds.above_zero().high, seconds.high);
+    // An error that is lost in the reference's noise.
+    let mut noise = Noise(3);
+    for _ in 0..50 {
+        let m = moments(&mut noise, 4, 0.0, 0.003, 0.1);
+        assert!(m.mse.low >= 0.0 && m.mse.low <= m.mse.value, "{:?}", m.mse);
+    }
+}
+
+#[test]
+fn squares_far_below_zero_do_not_prove_a_small_root() {
+    // -3 ± 2 standard deviations: the whole interval is below zero.
+    let root = Estimate::new(-3e-4, 1e-4, 2.0).root();
+    assert_eq!((root.value, root.low), (0.0, 0.0));
+    assert!((root.high - 1.96e-4f64.sqrt()).abs() < 1e-12, "{root:?}");
+    assert_eq!(Estimate::exact(0.0).root().high, 0.0);
+    // What is known to be above zero keeps its interval.
+    let seen = Estimate::new(4e-4, 1e-4, 2.0).root();
+    assert!((seen.high - 6e-4f64.sqrt()).abs() < 1e-12);
 }
