@@ -23,7 +23,7 @@ use crate::transport::candidates::Candidate;
 
 /// Share of the time of the whole picture that a trial takes, unless that is too little to see anything; and that it may
 /// take at most, beyond so many seconds.
-const SHARE: f64 = 0.02;
+const SHARE: f64 = 0.03;
 const MOST: f64 = 0.1;
 const SHORT: f64 = 0.1;
 /// Samples of each pixel that say enough.
@@ -296,7 +296,9 @@ impl Job {
                     "{needed} samples would take {expected:.1} s, too long for such a picture"
                 ));
             }
-            let seen = taken >= needed && (stats.seconds >= share || taken >= enough);
+            // Of the samples alone: few of them hide that some are rare and bright.
+            let seconds = stats.seconds - stats.phases.setup - stats.phases.radiosity;
+            let seen = taken >= needed && (seconds >= share || taken >= enough);
             match given_up.is_some() || seen {
                 true => ControlFlow::Break(()),
                 false => flow,
