@@ -7,9 +7,9 @@
 //!
 //! Two things that the spread of few samples does not show are looked at. Light that hardly any sample finds: where
 //! another integrator finds significantly more of it, so much is missing. How rarely it is found is not known, only that it
-//! is very bright then, so the squared error that its absence makes is not taken to fall at all. And the slower way down where photons are merged: as their radius
-//! shrinks by default, variance falls as N^-3/4 and squared bias as N^-1/2 (Knaus & Zwicker 2011), in place of N^-1, so N^-2/3
-//! is taken for both.
+//! is very bright then, so the squared error that its absence makes is not taken to fall at all. And the slower way down
+//! where photons are merged: as their radius shrinks by default, variance falls as N^-3/4 and squared bias as N^-1/2 (Knaus &
+//! Zwicker 2011), in place of N^-1, so N^-2/3 is taken for both.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -136,24 +136,22 @@ impl Choice {
 /// What was rendered on trial.
 struct Flown {
     spec: IntegratorSpec,
-    film: Film,
+    /// Of the best so far only: films are large.
+    film: Option<Film>,
+    /// Of each pixel.
+    samples: f64,
     stats: Stats,
     glance: Option<Vec<Glance>>,
 }
 
 impl Flown {
-    /// Of each pixel.
-    fn samples(&self) -> f64 {
-        self.film.samples() as f64 / pixels(&self.film)
-    }
-
     fn prepared(&self) -> f64 {
         self.stats.phases.setup + self.stats.phases.radiosity
     }
 
     /// For one sample of each pixel.
     fn seconds(&self) -> f64 {
-        (self.stats.seconds - self.prepared()).max(0.0) / self.samples().max(1.0)
+        (self.stats.seconds - self.prepared()).max(0.0) / self.samples.max(1.0)
     }
 
     /// relMSE of one sample, by its own means.
@@ -227,8 +225,16 @@ impl Job {
                 found: Err(outcome.as_ref().err().cloned().unwrap_or_default()),
             });
             flown.push(outcome.ok());
+            judge(&mut trials, &flown, work);
+            let best = best(&trials, &flown);
+            let others = flown
+                .iter_mut()
+                .enumerate()
+                .filter(|(i, _)| Some(*i) != best);
+            others
+                .filter_map(|(_, other)| other.as_mut())
+                .for_each(|other| other.film = None);
         }
-        judge(&mut trials, &flown, work);
         let Some(chosen) = best(&trials, &flown) else {
             return Err(RenderError::NoChoice(Choice {
                 trials,
@@ -248,11 +254,15 @@ impl Job {
         for entry in self.integrator.plan(&self.scene) {
             self.scene.decide(entry);
         }
-        let mut stats = winner.stats;
+        // One that seemed worse until another showed what to compare with begins anew.
+        let (film, mut stats) = match winner.film {
+            Some(film) => (film, winner.stats),
+            None => (self.film_for(work), Stats::default()),
+        };
         let all = start.elapsed().as_secs_f64();
         stats.phases.trials = (all - stats.seconds).max(0.0);
         stats.seconds = stats.seconds.max(all);
-        Ok((choice, winner.film, stats))
+        Ok((choice, film, stats))
     }
 
     /// Tries the job's integrator for as long as a trial may take in a picture of `whole` seconds, if that is known; the
@@ -316,7 +326,8 @@ impl Job {
         Ok(Flown {
             spec: self.integrator.clone().with_solution(solution),
             glance: film.glance(),
-            film,
+            samples: film.samples() as f64 / pixels(&film),
+            film: Some(film),
             stats,
         })
     }
@@ -377,7 +388,7 @@ fn judge(trials: &mut [Trial], flown: &[Option<Flown>], work: &Work) {
             own.pixels.len() as f64 * excess.powi(2) * of_tile(i)
         };
         trial.found = Ok(Measured {
-            samples: flown.samples(),
+            samples: flown.samples,
             relmse: relmse(glance),
             missed: (0..tiles).map(missing).sum::<f64>() / pixels,
             seconds: flown.seconds(),
