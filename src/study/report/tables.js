@@ -19,7 +19,7 @@ function floorText(m) {
 function forecastText(f) {
   if (f.kind === "exact") return ["at once"];
   if (f.kind === "never") return ["never: bias " + percent(f.bias)];
-  if (f.kind === "unknown") return f.why ? ["none", make("br"), make("span", { class: "range" }, f.why)] : ["–"];
+  if (f.kind === "unknown") return f.why ? ["none", make("br"), make("span", { class: "range why" }, f.why)] : ["–"];
   const times = (e) => `${short(Math.max(1, e.ci95[0]))} to ${short(e.ci95[1])}`;
   return [`${short(Math.max(1, f.spp.value))} spp, ${short(f.seconds.value)} s`, make("br"), make("span", { class: "range" }, times(f.spp) + " spp")];
 }
